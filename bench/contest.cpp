@@ -1,0 +1,80 @@
+#include "contest.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace packet::bench {
+namespace {
+
+template <class Answer>
+Agreement compare_bits(const std::vector<Answer>& first, const std::vector<Answer>& other) {
+    Agreement out;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+        ++(first[i] == other[i] ? out.same : out.different);
+    }
+    return out;
+}
+
+// Whether anything is hit says too little to judge a difference by, so the closest hits of those
+// rays do. Where even these agree, one of the two contradicts itself.
+Agreement compare_occluded(MeshView mesh, std::span<const Ray> rays, const Contender& first,
+                           const Answers& a, const Contender& other, const Answers& b) {
+    std::vector<Ray> unlike;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (a.occluded[i] != b.occluded[i]) unlike.push_back(rays[i]);
+    }
+    std::vector<Hit> first_hits(unlike.size()), other_hits(unlike.size());
+    first.closest(unlike, first_hits);
+    other.closest(unlike, other_hits);
+    const Agreement closest = compare_hits(mesh, unlike, first_hits, other_hits);
+    return {.same = rays.size() - unlike.size(),
+            .borderline = closest.borderline,
+            .different = unlike.size() - closest.borderline};
+}
+
+Agreement compare_answers(MeshView mesh, const RaySet& set, const Contender& first,
+                          const Answers& a, const Contender& other, const Answers& b) {
+    if (other.side == Side::kOurs && set.query == Query::kAny) {
+        return compare_bits(a.occluded, b.occluded);
+    }
+    if (other.side == Side::kOurs) return compare_bits(a.hits, b.hits);
+    if (set.query == Query::kAny) return compare_occluded(mesh, set.rays, first, a, other, b);
+    return compare_hits(mesh, set.rays, a.hits, b.hits);
+}
+
+double seconds_of(const Contender& contender, const RaySet& set, Answers& answers, int threads) {
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point begin = Clock::now();
+    contender.trace(set, answers, threads);
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+}  // namespace
+
+double Score::median_seconds() const {
+    std::vector<double> sorted = seconds;
+    std::ranges::sort(sorted);
+    const std::size_t half = sorted.size() / 2;
+    return sorted.size() % 2 != 0 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
+}
+
+std::vector<Score> hold(const Contest& contest, MeshView mesh, const RaySet& set,
+                        std::span<const Contender> contenders) {
+    const Contender& first = contenders.front();
+    const Answers expected = answers_of(first, set, contest.threads);
+    std::vector<Score> scores;
+    for (const Contender& contender : contenders) {
+        const Answers answers = answers_of(contender, set, contest.threads);
+        const Agreement agreement = compare_answers(mesh, set, first, expected, contender, answers);
+        scores.push_back({&contender, agreement, {}});
+    }
+    Answers answers = room_for(set);
+    for (int repeat = 0; repeat < contest.repeats; ++repeat) {
+        for (Score& score : scores) {
+            score.seconds.push_back(seconds_of(*score.contender, set, answers, contest.threads));
+        }
+    }
+    return scores;
+}
+
+}  // namespace packet::bench

@@ -1,0 +1,53 @@
+// What structure to build, how, and what came of it.
+#pragma once
+
+#include <packet/mesh.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace packet {
+
+/// The acceleration structures. They differ in how they are built, not in what they answer.
+enum class AccelKind : std::uint8_t {
+    kBvh  ///< bounding volume hierarchy by the binned surface area heuristic
+};
+
+struct BuildOptions {
+    AccelKind accel = AccelKind::kBvh;
+    /// Largest leaf, in triangles, 1 to 64. Larger leaves build faster and trace slower.
+    int max_leaf_size = 8;
+    /// Cost of visiting a node, in triangle tests. Raise it for flatter trees with larger leaves.
+    float traversal_cost = 1.0f;
+    /// Cost of testing a triangle. Only its ratio to `traversal_cost` matters.
+    float intersection_cost = 1.0f;
+    /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is the
+    /// same for any number.
+    int threads = 0;
+};
+
+struct BuildStats {
+    double seconds = 0.0;
+    std::size_t bytes = 0;  ///< memory of nodes and triangle blocks
+    std::size_t node_count = 0;
+    std::size_t leaf_count = 0;
+    int depth = 0;          ///< edges from the root to the deepest leaf
+    double sah_cost = 0.0;  ///< expected cost of a random ray that meets the root's box
+    SkippedTriangles skipped;
+};
+
+/// A structure's name on the command line and in files.
+struct AccelName {
+    AccelKind kind;
+    std::string_view name;
+};
+
+/// Every structure the library builds, in the order in which help lists them.
+[[nodiscard]] std::span<const AccelName> accel_names() noexcept;
+[[nodiscard]] std::string_view to_string(AccelKind kind) noexcept;
+/// Throws Error{kUnknownName} that lists the valid names.
+[[nodiscard]] AccelKind parse_accel(std::string_view name);
+
+}  // namespace packet

@@ -1,0 +1,104 @@
+// Tracing: closest-hit and any-hit, for one ray, packets, spans of rays and images.
+#pragma once
+
+#include <packet/hit.h>
+#include <packet/isa.h>
+#include <packet/ray.h>
+#include <packet/scene.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string_view>
+
+namespace packet {
+
+/// How rays walk the structure. All modes return the same hits.
+enum class Mode : std::uint8_t {
+    kAuto,     ///< looks at the rays and picks
+    kSingle,   ///< one ray at a time
+    kPacket8,  ///< 8 rays share one stack
+    kPacket16  ///< 16 rays share one stack
+};
+
+struct ModeName {
+    Mode mode;
+    std::string_view name;
+};
+[[nodiscard]] std::span<const ModeName> mode_names() noexcept;
+[[nodiscard]] std::string_view to_string(Mode mode) noexcept;
+/// Throws Error{kUnknownName} that lists the valid names.
+[[nodiscard]] Mode parse_mode(std::string_view name);
+
+/// Work counted while tracing.
+struct TraceStats {
+    std::uint64_t rays = 0;
+    std::uint64_t nodes = 0;           ///< boxes of nodes met by a lane, summed over lanes
+    std::uint64_t triangles = 0;       ///< triangles met by a lane, summed over lanes
+    std::uint64_t lanes_active = 0;    ///< lanes that took part in box tests
+    std::uint64_t lanes_issued = 0;    ///< lanes that were paid for in box tests
+
+    TraceStats& operator+=(const TraceStats& other) noexcept;
+    [[nodiscard]] double nodes_per_ray() const noexcept;
+    [[nodiscard]] double triangles_per_ray() const noexcept;
+    [[nodiscard]] double lane_utilization() const noexcept;
+};
+
+struct TraceOptions {
+    Mode mode = Mode::kAuto;
+    /// Threads to trace with, at most the CPU's; 0 takes all of them, 1 starts none.
+    int threads = 0;
+    /// If not 0, the rays are an image's in scanline order, this many to a line. They are then traced
+    /// in square tiles, which cohere better; the hits keep the rays' order.
+    int width = 0;
+    /// Kernels to use; without a value default_isa().
+    std::optional<IsaId> isa;
+    /// If set, work is counted into it (added to what it holds). Counting costs time.
+    TraceStats* stats = nullptr;
+};
+
+/// Closest hits of many rays: hits[i] belongs to rays[i]. Throws Error{kBadValue} if the spans differ
+/// in length, `threads` or `width` is negative, Error{kNotCommitted}, Error{kUnsupported}.
+void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
+                   const TraceOptions& options = {});
+/// Whether anything is hit: occluded[i] is 1 if rays[i] hits something, else 0. Errors as above.
+void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+               const TraceOptions& options = {});
+
+[[nodiscard]] Hit trace_closest(const Scene& scene, const Ray& ray);
+[[nodiscard]] bool trace_any(const Scene& scene, const Ray& ray);
+
+/// Closest hits of one packet, on this thread. Inactive lanes of `rays` are not read and those of
+/// `hits` not written.
+template <int N>
+void trace_closest(const Scene& scene, const RayPacket<N>& rays, LaneMask<N> active,
+                   HitPacket<N>& hits);
+/// The active lanes that hit anything.
+template <int N>
+[[nodiscard]] LaneMask<N> trace_any(const Scene& scene, const RayPacket<N>& rays,
+                                    LaneMask<N> active);
+
+extern template void trace_closest<8>(const Scene&, const Ray8&, LaneMask<8>, Hit8&);
+extern template void trace_closest<16>(const Scene&, const Ray16&, LaneMask<16>, Hit16&);
+extern template LaneMask<8> trace_any<8>(const Scene&, const Ray8&, LaneMask<8>);
+extern template LaneMask<16> trace_any<16>(const Scene&, const Ray16&, LaneMask<16>);
+
+/// A rectangle of pixels, `x1` and `y1` exclusive.
+struct Tile {
+    int x0, y0, x1, y1;
+    [[nodiscard]] int pixel_count() const noexcept { return (x1 - x0) * (y1 - y0); }
+};
+
+/// Fills one ray for each pixel of a tile, in scanline order within the tile.
+using GenerateTile = std::function<void(Tile, std::span<Ray>)>;
+/// Takes the hits of a tile, ordered as its rays. Called from many threads, for different tiles.
+using ConsumeTile = std::function<void(Tile, std::span<const Ray>, std::span<const Hit>)>;
+
+/// Traces an image of `width` x `height` pixels tile by tile, tiles spread over the threads: rays
+/// are made, traced and consumed while they are in the cache. Exceptions of the callbacks pass on.
+void trace_tiles(const Scene& scene, int width, int height, const GenerateTile& generate,
+                 const ConsumeTile& consume, const TraceOptions& options = {});
+
+}  // namespace packet

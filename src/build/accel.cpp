@@ -1,0 +1,54 @@
+// The table of structures: a new one adds a line to each of the two tables below.
+#include "build/bvh_sah.h"
+#include "build/tree.h"
+#include "core/macros.h"
+#include "core/names.h"
+
+#include <packet/accel.h>
+
+#include <array>
+#include <chrono>
+
+namespace packet {
+
+static constexpr std::array kAccelNames = {AccelName{AccelKind::kBvh, "bvh"}};
+
+std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
+
+std::string_view to_string(AccelKind kind) noexcept {
+    for (const AccelName& entry : kAccelNames) {
+        if (entry.kind == kind) return entry.name;
+    }
+    return "?";
+}
+
+AccelKind parse_accel(std::string_view name) {
+    return find_by_name(kAccelNames, name, "structure").kind;
+}
+
+static Hierarchy build_hierarchy(AlignedVector<Reference> references, const BuildOptions& options,
+                                 const Parallel& parallel) {
+    switch (options.accel) {
+        case AccelKind::kBvh: return build_bvh_sah(std::move(references), options, parallel);
+    }
+    PACKET_ASSERT(!"an AccelKind that is not in the enumeration");
+    return {};
+}
+
+Tree build_tree(MeshView mesh, const BuildOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    validate(mesh);
+    validate(options);
+    const Parallel parallel(options.threads);
+    References references;
+    parallel.run([&] { references = collect_references(mesh, parallel); });
+    const SkippedTriangles skipped = references.skipped;
+    Tree tree = make_tree(build_hierarchy(std::move(references.items), options, parallel), mesh,
+                          options, parallel);
+    tree.stats.skipped = skipped;
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    tree.stats.seconds = elapsed.count();
+    return tree;
+}
+
+}  // namespace packet

@@ -1,0 +1,27 @@
+// What every builder of hierarchies hands on: nodes in any order over a sorted list of references.
+// tree.h turns it into the linear arrays that are walked.
+#pragma once
+
+#include "build/references.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace packet {
+
+/// An inner node has two children and count 0; a leaf holds references `first` to `first + count`.
+struct BuildNode {
+    Bounds3f bounds;
+    std::uint32_t first = 0;  ///< inner: index of the first child
+    std::uint32_t second = 0;  ///< inner: index of the second child
+    std::uint32_t count = 0;
+
+    [[nodiscard]] bool is_leaf() const noexcept { return count != 0; }
+};
+
+struct Hierarchy {
+    std::vector<BuildNode> nodes;  ///< nodes[0] is the root; unused slots are never referred to
+    AlignedVector<Reference> references;
+};
+
+}  // namespace packet

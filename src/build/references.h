@@ -1,0 +1,34 @@
+// What builders sort: boxes with the id of what is in them.
+#pragma once
+
+#include "core/aligned_vector.h"
+#include "schedule/parallel.h"
+
+#include <packet/bounds.h>
+#include <packet/mesh.h>
+
+#include <cstdint>
+
+namespace packet {
+
+/// The box of an item (a triangle or an instance), in half a cache line.
+struct Reference {
+    glm::vec3 lower;
+    std::uint32_t id;
+    glm::vec3 upper;
+    std::uint32_t unused = 0;
+
+    [[nodiscard]] Bounds3f bounds() const noexcept { return {lower, upper}; }
+};
+static_assert(sizeof(Reference) == 32);
+
+struct References {
+    AlignedVector<Reference> items;
+    Bounds3f bounds;
+    SkippedTriangles skipped;
+};
+
+/// One reference a triangle that can be hit, in order of the triangles. O(n), parallel.
+[[nodiscard]] References collect_references(MeshView mesh, const Parallel& parallel);
+
+}  // namespace packet

@@ -1,0 +1,36 @@
+// The tree that kernels walk, as the arrays of core/views.h, and how builders' hierarchies get there.
+#pragma once
+
+#include "build/hierarchy.h"
+#include "core/views.h"
+
+#include <packet/accel.h>
+
+namespace packet {
+
+/// Owns what a TreeView shows.
+struct Tree {
+    AlignedVector<Node> nodes;
+    AlignedVector<TriangleBlock> blocks;
+    Bounds3f bounds;
+    BuildStats stats;
+
+    [[nodiscard]] TreeView view() const noexcept;
+};
+
+/// Lays the hierarchy out depth first, its triangles as blocks. Leaves that fit into one block do not
+/// straddle two. Fills node, leaf, depth, byte and cost statistics. O(n), blocks in parallel.
+[[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
+                             const Parallel& parallel);
+
+/// Lays out only nodes; items of the leaves are the hierarchy's references.
+[[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options);
+
+/// Builds the structure that `options.accel` names. Triangles that can never be hit are left out and
+/// counted. The mesh may be destroyed afterwards. Throws Error as validate() and for bad options.
+[[nodiscard]] Tree build_tree(MeshView mesh, const BuildOptions& options);
+
+/// Throws Error{kBadValue} that names the option out of its documented range.
+void validate(const BuildOptions& options);
+
+}  // namespace packet

@@ -1,0 +1,67 @@
+// The arrays that kernels walk, as plain structs of pointers and counts. Builders make them, kernels
+// read them, nobody else needs to know how they came about.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+namespace packet {
+
+/// Lanes in a block of triangles, and the alignment of blocks and nodes.
+inline constexpr int kBlockSize = 8;
+/// No tree is deeper, in edges from the root to a leaf: stacks of the kernels are this long.
+inline constexpr int kMaxDepth = 64;
+/// Coordinates beyond this would overflow in products of the triangle test.
+inline constexpr float kMaxCoordinate = 1.8e18f;
+/// 8 ulp: what rounding in the box test and the triangle test comes to, with room to spare.
+inline constexpr float kBoxSlack = 8.0f / 16777216.0f;
+/// 1 ulp of the ray's origin or more, along each axis.
+inline constexpr float kOriginSlack = 2.0f / 16777216.0f;
+
+/// A node of a binary tree in depth-first order: the first child of an inner node follows it.
+struct Node {
+    float plane[2][3];    ///< [0] lower, [1] upper corner of the box
+    std::uint32_t link;   ///< inner: index of the second child; leaf: its first item
+    std::uint32_t count;  ///< inner: 0; leaf: how many items
+
+    [[nodiscard]] bool is_leaf() const noexcept { return count != 0; }
+};
+static_assert(sizeof(Node) == 32 && std::is_trivially_copyable_v<Node>);
+
+/// Eight triangles as a structure of arrays. Lanes without one hold NaN, which nothing hits.
+struct alignas(32) TriangleBlock {
+    float v[3][3][kBlockSize];  ///< [corner][axis][lane]
+    std::int32_t prim_id[kBlockSize];
+};
+static_assert(sizeof(TriangleBlock) == 320 && std::is_trivially_copyable_v<TriangleBlock>);
+
+/// A tree. Items of leaves are triangles (item i is lane i % 8 of block i / 8) or instances.
+struct TreeView {
+    const Node* nodes = nullptr;
+    const TriangleBlock* blocks = nullptr;
+    std::uint32_t node_count = 0;  ///< 0: nothing to hit
+    float lower[3] = {0, 0, 0};    ///< the box of all items
+    float upper[3] = {0, 0, 0};
+    /// Boxes are taken as grown by slack * (max |corner of the tree's box - org| + reach) and an ulp
+    /// of org. This covers all rounding on the way to a hit: no box that holds one is ever missed.
+    float slack = kBoxSlack;
+    float reach = 0.0f;
+};
+
+/// A mesh placed in the world.
+struct InstanceView {
+    float object_from_world[3][4];  ///< rows; the last column is the translation
+    std::uint32_t instance_id;
+    TreeView tree;
+};
+
+/// What the world consists of: instances, under a tree whose leaves hold them.
+struct SceneView {
+    TreeView top;
+    const InstanceView* instances = nullptr;
+    const std::uint32_t* mesh_of_instance = nullptr;  ///< by instance_id
+    std::uint32_t instance_count = 0;
+    bool is_single_mesh = false;  ///< one instance, not moved: its tree is walked at once
+};
+
+}  // namespace packet

@@ -1,0 +1,61 @@
+// The nearest hits so far, one a lane, and the rule that makes them unique.
+#pragma once
+
+#include "kernels/lanes.h"
+
+namespace packet {
+
+enum class Query { kClosest, kAny };
+
+inline constexpr float kLargestFloat = 3.402823466e38f;
+inline constexpr float kNever = -__builtin_huge_valf();
+inline constexpr std::int32_t kNoId = 0x7FFFFFFF;  // greater than any id, so any id wins a tie
+
+template <int N, class Isa>
+struct BestHits {
+    using F = Float<N, Isa>;
+    using I = Int<N, Isa>;
+    using M = Mask<N, Isa>;
+
+    /// Farther than this nothing counts. kNever in lanes that take no part, or no longer do: then no
+    /// comparison with it holds, and no other mask is needed.
+    F t;
+    F u, v;
+    I prim_id, instance_id;
+    /// At equal t a hit counts if its prim_id is less than this: prim_id within an instance; across
+    /// instances all or nothing, as the order of the instances says.
+    I tie_prim_id;
+
+    PACKET_INLINE BestHits(const F& tfar, M active)
+        : t(select(active, min(tfar, F(kLargestFloat)), F(kNever))),
+          u(0.0f),
+          v(0.0f),
+          prim_id(kNoId),
+          instance_id(kNoId),
+          tie_prim_id(kNoId) {}
+
+    PACKET_INLINE void enter_instance(std::int32_t id) {
+        tie_prim_id = select(I(id) < instance_id, I(kNoId), I(-1));
+    }
+    /// `hit` lanes have new_t <= t.
+    template <Query query>
+    PACKET_INLINE void update(M hit, const F& new_t, const F& new_u, const F& new_v,
+                              const I& new_prim_id, std::int32_t instance) {
+        if constexpr (query == Query::kAny) {
+            t = select(hit, F(kNever), t);
+            prim_id = select(hit, new_prim_id, prim_id);
+        } else {
+            // if (new_t < t || new_prim_id < tie_prim_id) take it
+            const M closer = hit & ((new_t < t) | (new_prim_id < tie_prim_id));
+            t = select(closer, new_t, t);
+            u = select(closer, new_u, u);
+            v = select(closer, new_v, v);
+            prim_id = select(closer, new_prim_id, prim_id);
+            tie_prim_id = select(closer, new_prim_id, tie_prim_id);
+            instance_id = select(closer, I(instance), instance_id);
+        }
+    }
+    PACKET_INLINE M found() const { return prim_id < I(kNoId); }
+};
+
+}  // namespace packet

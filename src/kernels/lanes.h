@@ -1,0 +1,172 @@
+// N lanes of floats, integers and truth values, of one instruction set: what kernels compute with.
+// N lanes take as many registers as they need (16 lanes: one of AVX-512, two of AVX2, four of SSE).
+// Every operation rounds as IEEE 754 says, once, so a lane's bits do not depend on N or the ISA.
+#pragma once
+
+#include "core/macros.h"
+#include "kernels/registers.h"
+
+#include <cstdint>
+
+namespace packet {
+
+template <int N, class Isa>
+struct LanesOf {
+    using Reg = typename RegisterFor<Isa, N>::Type;
+    static constexpr int kRegisters = N / Reg::kWidth;
+    static_assert(kRegisters * Reg::kWidth == N);
+};
+
+/// Truth values. Bit i of bits() is lane i.
+template <int N, class Isa>
+struct Mask : LanesOf<N, Isa> {
+    using Reg = typename LanesOf<N, Isa>::Reg;
+    static constexpr int kCount = LanesOf<N, Isa>::kRegisters;
+    typename Reg::M r[kCount];
+
+    PACKET_INLINE static Mask from_bits(std::uint32_t bits) {
+        Mask out;
+        for (int i = 0; i < kCount; ++i) out.r[i] = Reg::from_bits(bits >> i * Reg::kWidth);
+        return out;
+    }
+    PACKET_INLINE std::uint32_t bits() const {
+        std::uint32_t out = 0;
+        for (int i = 0; i < kCount; ++i) out |= Reg::bits(r[i]) << i * Reg::kWidth;
+        return out;
+    }
+
+    PACKET_INLINE friend Mask operator&(Mask a, Mask b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::both(a.r[i], b.r[i]);
+        return a;
+    }
+    PACKET_INLINE friend Mask operator|(Mask a, Mask b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::either(a.r[i], b.r[i]);
+        return a;
+    }
+    PACKET_INLINE friend Mask operator~(Mask a) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::invert(a.r[i]);
+        return a;
+    }
+};
+
+template <int N, class Isa>
+PACKET_INLINE bool any(Mask<N, Isa> m) {
+    return m.bits() != 0;
+}
+template <int N, class Isa>
+PACKET_INLINE bool none(Mask<N, Isa> m) {
+    return m.bits() == 0;
+}
+template <int N, class Isa>
+PACKET_INLINE int count(Mask<N, Isa> m) {
+    return __builtin_popcount(m.bits());
+}
+
+/// What Float and Int share: loading, storing, comparing, choosing.
+template <class Self, class T, int N, class Isa>
+struct LaneValues {
+    using Reg = typename LanesOf<N, Isa>::Reg;
+    using M = Mask<N, Isa>;
+    static constexpr int kCount = LanesOf<N, Isa>::kRegisters;
+
+    PACKET_INLINE static Self load(const T* p) {
+        Self out;
+        for (int i = 0; i < kCount; ++i) out.r[i] = Reg::load(p + i * Reg::kWidth);
+        return out;
+    }
+    PACKET_INLINE void store(T* p) const {
+        for (int i = 0; i < kCount; ++i) Reg::store(p + i * Reg::kWidth, self().r[i]);
+    }
+    /// Stores the lanes of `m` and leaves the others as they are in memory.
+    PACKET_INLINE void store(T* p, M m) const { select(m, self(), load(p)).store(p); }
+
+    PACKET_INLINE friend M operator<(const Self& a, const Self& b) {
+        M out;
+        for (int i = 0; i < kCount; ++i) out.r[i] = Reg::less(a.r[i], b.r[i]);
+        return out;
+    }
+    PACKET_INLINE friend M operator<=(const Self& a, const Self& b) {
+        M out;
+        for (int i = 0; i < kCount; ++i) out.r[i] = Reg::less_equal(a.r[i], b.r[i]);
+        return out;
+    }
+    PACKET_INLINE friend M operator==(const Self& a, const Self& b) {
+        M out;
+        for (int i = 0; i < kCount; ++i) out.r[i] = Reg::equal(a.r[i], b.r[i]);
+        return out;
+    }
+    PACKET_INLINE friend M operator>(const Self& a, const Self& b) { return b < a; }
+    PACKET_INLINE friend M operator>=(const Self& a, const Self& b) { return b <= a; }
+
+    /// m ? a : b
+    PACKET_INLINE friend Self select(M m, Self a, const Self& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::select(m.r[i], a.r[i], b.r[i]);
+        return a;
+    }
+
+private:
+    PACKET_INLINE const Self& self() const { return static_cast<const Self&>(*this); }
+};
+
+template <int N, class Isa>
+struct Float : LaneValues<Float<N, Isa>, float, N, Isa> {
+    using Reg = typename LanesOf<N, Isa>::Reg;
+    static constexpr int kCount = LanesOf<N, Isa>::kRegisters;
+    typename Reg::F r[kCount];
+
+    Float() = default;
+    PACKET_INLINE Float(float a) {
+        for (int i = 0; i < kCount; ++i) r[i] = Reg::broadcast(a);
+    }
+
+    PACKET_INLINE friend Float operator+(Float a, const Float& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::add(a.r[i], b.r[i]);
+        return a;
+    }
+    PACKET_INLINE friend Float operator-(Float a, const Float& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::sub(a.r[i], b.r[i]);
+        return a;
+    }
+    PACKET_INLINE friend Float operator*(Float a, const Float& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::mul(a.r[i], b.r[i]);
+        return a;
+    }
+    PACKET_INLINE friend Float operator/(Float a, const Float& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::div(a.r[i], b.r[i]);
+        return a;
+    }
+    PACKET_INLINE friend Float abs(Float a) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::abs(a.r[i]);
+        return a;
+    }
+    /// a < b ? a : b, so b where either is NaN.
+    PACKET_INLINE friend Float min(Float a, const Float& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::min(a.r[i], b.r[i]);
+        return a;
+    }
+    /// a > b ? a : b, so b where either is NaN.
+    PACKET_INLINE friend Float max(Float a, const Float& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::max(a.r[i], b.r[i]);
+        return a;
+    }
+};
+
+template <int N, class Isa>
+struct Int : LaneValues<Int<N, Isa>, std::int32_t, N, Isa> {
+    using Reg = typename LanesOf<N, Isa>::Reg;
+    static constexpr int kCount = LanesOf<N, Isa>::kRegisters;
+    typename Reg::I r[kCount];
+
+    Int() = default;
+    PACKET_INLINE Int(std::int32_t a) {
+        for (int i = 0; i < kCount; ++i) r[i] = Reg::broadcast(a);
+    }
+};
+
+/// Three floats a lane.
+template <int N, class Isa>
+struct Float3 {
+    Float<N, Isa> x, y, z;
+};
+
+}  // namespace packet

@@ -1,0 +1,154 @@
+// One register of each instruction set: the operations that lanes.h builds lanes from. This is the
+// only file that names xsimd's types. It serves xsimd 8 (no way to ask a mask for its bits, other
+// names for casts of masks) and xsimd 13 alike by reading masks from the registers themselves.
+#pragma once
+
+#include "core/macros.h"
+#include "kernels/isa_types.h"
+
+#include <cstdint>
+
+#if defined(__SSE4_2__)
+#include <xsimd/xsimd.hpp>
+#endif
+
+namespace packet {
+
+/// Registers of one lane, for any CPU. Written out, since this is what "the same bits" is held to.
+template <class Isa>
+struct ScalarRegister {
+    static constexpr int kWidth = 1;
+    using F = float;
+    using I = std::int32_t;
+    using M = bool;
+
+    PACKET_INLINE static F load(const float* p) { return *p; }
+    PACKET_INLINE static I load(const std::int32_t* p) { return *p; }
+    PACKET_INLINE static void store(float* p, F a) { *p = a; }
+    PACKET_INLINE static void store(std::int32_t* p, I a) { *p = a; }
+    PACKET_INLINE static F broadcast(float a) { return a; }
+    PACKET_INLINE static I broadcast(std::int32_t a) { return a; }
+    PACKET_INLINE static F add(F a, F b) { return a + b; }
+    PACKET_INLINE static F sub(F a, F b) { return a - b; }
+    PACKET_INLINE static F mul(F a, F b) { return a * b; }
+    PACKET_INLINE static F div(F a, F b) { return a / b; }
+    PACKET_INLINE static F abs(F a) { return __builtin_fabsf(a); }
+    PACKET_INLINE static F min(F a, F b) { return a < b ? a : b; }
+    PACKET_INLINE static F max(F a, F b) { return a > b ? a : b; }
+    template <class T>
+    PACKET_INLINE static M less(T a, T b) { return a < b; }
+    template <class T>
+    PACKET_INLINE static M less_equal(T a, T b) { return a <= b; }
+    template <class T>
+    PACKET_INLINE static M equal(T a, T b) { return a == b; }
+    PACKET_INLINE static M both(M a, M b) { return a && b; }
+    PACKET_INLINE static M either(M a, M b) { return a || b; }
+    PACKET_INLINE static M invert(M a) { return !a; }
+    template <class T>
+    PACKET_INLINE static T select(M m, T a, T b) { return m ? a : b; }
+    PACKET_INLINE static std::uint32_t bits(M m) { return m ? 1u : 0u; }
+    PACKET_INLINE static M from_bits(std::uint32_t bits) { return (bits & 1u) != 0; }
+};
+
+#if defined(__SSE4_2__)
+
+PACKET_INLINE std::uint32_t mask_bits(__m128 m) {
+    return static_cast<std::uint32_t>(_mm_movemask_ps(m));
+}
+PACKET_INLINE __m128 as_float_mask(__m128i m) { return _mm_castsi128_ps(m); }
+PACKET_INLINE __m128i as_int_mask(__m128 m) { return _mm_castps_si128(m); }
+#if defined(__AVX2__)
+PACKET_INLINE std::uint32_t mask_bits(__m256 m) {
+    return static_cast<std::uint32_t>(_mm256_movemask_ps(m));
+}
+PACKET_INLINE __m256 as_float_mask(__m256i m) { return _mm256_castsi256_ps(m); }
+PACKET_INLINE __m256i as_int_mask(__m256 m) { return _mm256_castps_si256(m); }
+#endif
+#if defined(__AVX512F__)
+PACKET_INLINE std::uint32_t mask_bits(__mmask16 m) { return m; }
+PACKET_INLINE __mmask16 as_float_mask(__mmask16 m) { return m; }
+PACKET_INLINE __mmask16 as_int_mask(__mmask16 m) { return m; }
+#endif
+
+/// Registers of xsimd's architecture `Arch`. A mask is one of floats; masks of integers are recast.
+template <class Arch>
+struct XsimdRegister {
+    using F = xsimd::batch<float, Arch>;
+    using I = xsimd::batch<std::int32_t, Arch>;
+    using M = xsimd::batch_bool<float, Arch>;
+    using IntMask = xsimd::batch_bool<std::int32_t, Arch>;
+    static constexpr int kWidth = static_cast<int>(F::size);
+
+    PACKET_INLINE static M recast(IntMask m) { return M(as_float_mask(m.data)); }
+    PACKET_INLINE static IntMask recast(M m) { return IntMask(as_int_mask(m.data)); }
+
+    PACKET_INLINE static F load(const float* p) { return F::load_unaligned(p); }
+    PACKET_INLINE static I load(const std::int32_t* p) { return I::load_unaligned(p); }
+    PACKET_INLINE static void store(float* p, F a) { a.store_unaligned(p); }
+    PACKET_INLINE static void store(std::int32_t* p, I a) { a.store_unaligned(p); }
+    PACKET_INLINE static F broadcast(float a) { return F(a); }
+    PACKET_INLINE static I broadcast(std::int32_t a) { return I(a); }
+    PACKET_INLINE static F add(F a, F b) { return a + b; }
+    PACKET_INLINE static F sub(F a, F b) { return a - b; }
+    PACKET_INLINE static F mul(F a, F b) { return a * b; }
+    PACKET_INLINE static F div(F a, F b) { return a / b; }
+    PACKET_INLINE static F abs(F a) { return xsimd::abs(a); }
+    PACKET_INLINE static F min(F a, F b) { return xsimd::min(a, b); }
+    PACKET_INLINE static F max(F a, F b) { return xsimd::max(a, b); }
+    PACKET_INLINE static M less(F a, F b) { return a < b; }
+    PACKET_INLINE static M less_equal(F a, F b) { return a <= b; }
+    PACKET_INLINE static M equal(F a, F b) { return a == b; }
+    PACKET_INLINE static M less(I a, I b) { return recast(a < b); }
+    PACKET_INLINE static M less_equal(I a, I b) { return recast(a <= b); }
+    PACKET_INLINE static M equal(I a, I b) { return recast(a == b); }
+    PACKET_INLINE static M both(M a, M b) { return a & b; }
+    PACKET_INLINE static M either(M a, M b) { return a | b; }
+    PACKET_INLINE static M invert(M a) { return ~a; }
+    PACKET_INLINE static F select(M m, F a, F b) { return xsimd::select(m, a, b); }
+    PACKET_INLINE static I select(M m, I a, I b) { return xsimd::select(recast(m), a, b); }
+    PACKET_INLINE static std::uint32_t bits(M m) { return mask_bits(m.data); }
+
+    PACKET_INLINE static M from_bits(std::uint32_t bits) {
+        if constexpr (requires(typename M::register_type r) { r = std::uint16_t{}; }) {
+            return M(static_cast<typename M::register_type>(bits));
+        } else {
+            constexpr std::int32_t kLaneBit[8] = {1, 2, 4, 8, 16, 32, 64, 128};
+            const I lane_bit = load(kLaneBit);
+            return equal(I(static_cast<std::int32_t>(bits)) & lane_bit, lane_bit);
+        }
+    }
+};
+
+#endif
+
+/// The register that serves N lanes of an ISA best. One lane is a scalar on every CPU.
+template <class Isa, int N>
+struct RegisterFor {
+    using Type = ScalarRegister<Isa>;
+};
+#if defined(__SSE4_2__)
+template <int N>
+    requires(N >= 4)
+struct RegisterFor<isa::Sse42, N> {
+    using Type = XsimdRegister<xsimd::sse4_2>;
+};
+#endif
+#if defined(__AVX2__)
+template <int N>
+    requires(N >= 8)
+struct RegisterFor<isa::Avx2, N> {
+    using Type = XsimdRegister<xsimd::fma3<xsimd::avx2>>;
+};
+#endif
+#if defined(__AVX512F__)
+template <>
+struct RegisterFor<isa::Avx512, 8> {
+    using Type = XsimdRegister<xsimd::fma3<xsimd::avx2>>;
+};
+template <>
+struct RegisterFor<isa::Avx512, 16> {
+    using Type = XsimdRegister<xsimd::avx512dq>;
+};
+#endif
+
+}  // namespace packet

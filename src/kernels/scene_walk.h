@@ -1,0 +1,89 @@
+// Walks a scene: the tree over instances, and in its leaves the trees of their meshes, with the rays
+// moved into the space of the mesh and `t` left alone. A scene that is one mesh is walked directly.
+#pragma once
+
+#include "kernels/leaf.h"
+#include "kernels/packet_walk.h"
+
+namespace packet {
+
+template <Query query, Directions directions, int N, class Isa, class Stats>
+PACKET_INLINE void walk_mesh_directed(const TreeView& tree, const PreparedRays<N, Isa>& ray,
+                                      std::int32_t instance_id, BestHits<N, Isa>& best,
+                                      Stats& stats) {
+    walk_tree<directions>(tree, ray, best.t, stats,
+                          [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
+                              stats.triangles(count(active) * static_cast<int>(item_count));
+                              meet_triangles<query, directions>(tree, ray, first, item_count,
+                                                                instance_id, best);
+                          });
+}
+
+/// The lanes of `ray` that are usable in the mesh's space and still look for something meet the mesh.
+template <Query query, int N, class Isa, class Stats>
+[[gnu::noinline]] void walk_mesh(const TreeView& tree, const RayLanes<N, Isa>& ray,
+                                 std::int32_t instance_id, BestHits<N, Isa>& best, Stats& stats) {
+    using F = Float<N, Isa>;
+    if (tree.node_count == 0) return;
+    const Mask<N, Isa> looking = best.t > F(kNever);
+    const Mask<N, Isa> active = looking & usable(ray);
+    if (none(active)) return;
+    PreparedRays<N, Isa> prepared;
+    prepare_boxes(prepared, tree, ray);
+    prepare_triangles(prepared, ray, active.bits());
+    best.enter_instance(instance_id);
+
+    const F kept = best.t;
+    best.t = select(active, best.t, F(kNever));
+    if (prepared.directions == Directions::kShared) {
+        walk_mesh_directed<query, Directions::kShared>(tree, prepared, instance_id, best, stats);
+    } else if constexpr (N > 1) {
+        walk_mesh_directed<query, Directions::kMixed>(tree, prepared, instance_id, best, stats);
+    }
+    best.t = select(active, best.t, kept);
+}
+
+/// object = M * world, rounded in this order on every ISA.
+template <int N, class Isa>
+PACKET_INLINE RayLanes<N, Isa> to_object(const InstanceView& instance,
+                                         const RayLanes<N, Isa>& world) {
+    using F = Float<N, Isa>;
+    RayLanes<N, Isa> out;
+    for (int row = 0; row < 3; ++row) {
+        const float* m = instance.object_from_world[row];
+        out.dir[row] = F(m[0]) * world.dir[0] + F(m[1]) * world.dir[1] + F(m[2]) * world.dir[2];
+        out.org[row] = F(m[0]) * world.org[0] + F(m[1]) * world.org[1] + F(m[2]) * world.org[2] +
+                       F(m[3]);
+    }
+    out.tnear = world.tnear;
+    out.tfar = world.tfar;
+    return out;
+}
+
+template <Query query, int N, class Isa, class Stats>
+PACKET_INLINE void walk_scene(const SceneView& scene, const RayLanes<N, Isa>& ray,
+                              BestHits<N, Isa>& best, Stats& stats) {
+    if (scene.is_single_mesh) {
+        const InstanceView& only = scene.instances[0];
+        walk_mesh<query>(only.tree, ray, static_cast<std::int32_t>(only.instance_id), best, stats);
+        return;
+    }
+    if (scene.top.node_count == 0) return;
+    PreparedRays<N, Isa> prepared;
+    prepare_boxes(prepared, scene.top, ray);
+    walk_tree<Directions::kMixed>(
+        scene.top, prepared, best.t, stats,
+        [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
+            // Lanes that miss the instance's box sit out, as they would in a tree.
+            const Float<N, Isa> kept = best.t;
+            best.t = select(active, best.t, Float<N, Isa>(kNever));
+            for (std::uint32_t i = first; i < first + item_count; ++i) {
+                const InstanceView& instance = scene.instances[i];
+                walk_mesh<query>(instance.tree, to_object(instance, ray),
+                                 static_cast<std::int32_t>(instance.instance_id), best, stats);
+            }
+            best.t = select(active, best.t, kept);
+        });
+}
+
+}  // namespace packet

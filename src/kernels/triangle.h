@@ -1,0 +1,140 @@
+// The watertight triangle test, in the lanes of whoever calls: many rays and one triangle, or one ray
+// and many triangles. Three edge functions of the sheared triangle tell on which side of each edge
+// the ray passes. Their signs are exact, so two triangles that share an edge never disagree about it
+// and no ray slips through between them.
+//
+// Woop, Benthin, Wald. Watertight ray/triangle intersection. JCGT 2013.
+#pragma once
+
+#include "kernels/box.h"
+#include "kernels/ray_setup.h"
+
+namespace packet {
+
+/// Corners of the lanes' triangles, [corner][axis].
+template <int N, class Isa>
+struct Triangles {
+    Float<N, Isa> v[3][3];
+};
+
+/// Edge functions: twice the signed areas that the ray spans with the edge opposite to a corner.
+template <int N, class Isa>
+struct Edges {
+    Float<N, Isa> u, v, w;
+};
+
+template <int N, class Isa>
+struct TriangleHits {
+    Mask<N, Isa> hit;
+    Float<N, Isa> t, u, v;
+};
+
+/// a * b - c * d with the sign that it would have without rounding. The products are exact in
+/// double, their difference keeps its sign, and so does the cast: what would underflow stays the
+/// smallest float.
+PACKET_INLINE float exact_sign_difference(float a, float b, float c, float d) {
+    const double exact = static_cast<double>(a) * b - static_cast<double>(c) * d;
+    const float rounded = static_cast<float>(exact);
+    if (rounded != 0.0f || exact == 0.0) return rounded;
+    constexpr float kSmallest = 1.401298464e-45f;
+    return exact > 0.0 ? kSmallest : -kSmallest;
+}
+
+/// Recomputes the edge functions of the lanes in `bits` so that zero means zero. Rare: rays that pass
+/// an edge or a corner as closely as float can tell.
+template <int N, class Isa>
+[[gnu::noinline]] void decide_edges(const Float3<N, Isa> (&p)[3], std::uint32_t bits,
+                                    Edges<N, Isa>& edges) {
+    float x[3][N], y[3][N], u[N], v[N], w[N];
+    for (int corner = 0; corner < 3; ++corner) {
+        p[corner].x.store(x[corner]);
+        p[corner].y.store(y[corner]);
+    }
+    edges.u.store(u), edges.v.store(v), edges.w.store(w);
+    for (; bits != 0; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        u[i] = exact_sign_difference(x[2][i], y[1][i], y[2][i], x[1][i]);
+        v[i] = exact_sign_difference(x[0][i], y[2][i], y[0][i], x[2][i]);
+        w[i] = exact_sign_difference(x[1][i], y[0][i], y[1][i], x[0][i]);
+    }
+    edges = {Float<N, Isa>::load(u), Float<N, Isa>::load(v), Float<N, Isa>::load(w)};
+}
+
+/// A corner seen from the ray: sheared so that the ray runs along z from the origin.
+template <Directions directions, int N, class Isa>
+PACKET_INLINE Float3<N, Isa> to_ray_space(const PreparedRays<N, Isa>& ray,
+                                          const Float<N, Isa> (&corner)[3]) {
+    Float3<N, Isa> p;
+    if constexpr (directions == Directions::kShared) {
+        p = {corner[0] - ray.org[0], corner[1] - ray.org[1], corner[2] - ray.org[2]};
+    } else {
+        const Float<N, Isa> d[3] = {corner[0] - ray.org[0], corner[1] - ray.org[1],
+                                    corner[2] - ray.org[2]};
+        p = rotate_axes(ray, d);
+    }
+    return {p.x - ray.shear_x * p.z, p.y - ray.shear_y * p.z, p.z};
+}
+
+/// Where the rays enter and leave the triangles' own boxes.
+template <int N, class Isa>
+PACKET_INLINE Interval<N, Isa> triangle_box(const PreparedRays<N, Isa>& ray,
+                                            const Float<N, Isa> (&v)[3][3]) {
+    Float<N, Isa> lower[3], upper[3];
+    for (int a = 0; a < 3; ++a) {
+        lower[a] = min(v[0][a], min(v[1][a], v[2][a]));
+        upper[a] = max(v[0][a], max(v[1][a], v[2][a]));
+    }
+    return slabs(ray, lower, upper);
+}
+
+/// Edge functions of corners in ray space, exact in sign.
+template <int N, class Isa>
+PACKET_INLINE Edges<N, Isa> edge_functions(const Float3<N, Isa> (&p)[3]) {
+    const Float<N, Isa> zero(0.0f);
+    Edges<N, Isa> e = {p[2].x * p[1].y - p[2].y * p[1].x, p[0].x * p[2].y - p[0].y * p[2].x,
+                       p[1].x * p[0].y - p[1].y * p[0].x};
+    const Mask<N, Isa> undecided = (e.u == zero) | (e.v == zero) | (e.w == zero);
+    if (any(undecided)) [[unlikely]] decide_edges(p, undecided.bits(), e);
+    return e;
+}
+
+/// Tests the lanes. `corners(corner, axis)` yields a coordinate of the lanes' triangles, axis being
+/// one of x, y, z. A lane hits if the ray passes inside or on the edges, the triangle's box is met,
+/// and t, moved into that box, lies in [tnear, best_t].
+template <Directions directions, int N, class Isa, class Corners>
+PACKET_INLINE TriangleHits<N, Isa> test_triangles(const PreparedRays<N, Isa>& ray,
+                                                  const Float<N, Isa>& best_t, Corners corners) {
+    using F = Float<N, Isa>;
+    const F zero(0.0f);
+    Float3<N, Isa> p[3];
+    for (int corner = 0; corner < 3; ++corner) {
+        const F in_ray_order[3] = {corners(corner, ray.axis[0]), corners(corner, ray.axis[1]),
+                                   corners(corner, ray.axis[2])};
+        p[corner] = to_ray_space<directions>(ray, in_ray_order);
+    }
+    const Edges<N, Isa> e = edge_functions(p);
+    const F det = e.u + e.v + e.w;
+    // inside: no two edges see the ray on different sides; false for NaN
+    TriangleHits<N, Isa> out;
+    out.hit = (((e.u >= zero) & (e.v >= zero) & (e.w >= zero)) |
+               ((e.u <= zero) & (e.v <= zero) & (e.w <= zero))) &
+              ~(det == zero);
+    if (none(out.hit)) return out;
+
+    const F u = e.u / det, v = e.v / det, w = e.w / det;
+    F t = u * (ray.scale_z * p[0].z) + v * (ray.scale_z * p[1].z) + w * (ray.scale_z * p[2].z);
+    F xyz[3][3];
+    for (int corner = 0; corner < 3; ++corner) {
+        for (int a = 0; a < 3; ++a) xyz[corner][a] = corners(corner, a);
+    }
+    const Interval<N, Isa> box = triangle_box(ray, xyz);
+    // max and min yield their second operand for NaN: a NaN stays one and fails the comparisons
+    t = min(box.exit, max(box.enter, t)) + zero;  // + 0 makes -0 a 0
+    out.hit = out.hit & (box.enter <= box.exit) & (ray.tnear <= t) & (t <= best_t);
+    out.t = t;
+    out.u = v + zero;  // the barycentric coordinate that belongs to the second corner
+    out.v = w + zero;
+    return out;
+}
+
+}  // namespace packet

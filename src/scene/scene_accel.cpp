@@ -1,0 +1,116 @@
+#include "scene/scene_accel.h"
+
+#include "build/bvh_sah.h"
+#include "scene/transform.h"
+
+#include <packet/error.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+
+namespace packet {
+
+namespace {
+
+void add_stats(BuildStats& sum, const BuildStats& tree) {
+    sum.bytes += tree.bytes;
+    sum.node_count += tree.node_count;
+    sum.leaf_count += tree.leaf_count;
+    sum.depth = std::max(sum.depth, tree.depth);
+    sum.skipped.non_finite += tree.skipped.non_finite;
+    sum.skipped.too_large += tree.skipped.too_large;
+    sum.skipped.zero_area += tree.skipped.zero_area;
+}
+
+void build_trees(std::span<const TriangleMesh> meshes, const BuildOptions& options,
+                 SceneAccel& out) {
+    std::size_t most_triangles = 0;
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+        out.trees.push_back(build_tree(meshes[i].view(), options));
+        add_stats(out.stats, out.trees.back().stats);
+        if (meshes[i].triangles.size() < most_triangles) continue;
+        most_triangles = meshes[i].triangles.size();
+        out.stats.sah_cost = out.trees.back().stats.sah_cost;
+    }
+}
+
+/// What rounding in the transform of a ray comes to, for the worst instance: ray and inverse are
+/// rounded in float, and the inverse magnifies that by its condition. The errors scale with the
+/// numbers that are added up: origin, translation and corners. 4 roundings a component of the
+/// origin, 3 of the direction, 2 of the matrix, and the 8 ulp of the mesh's own boxes: 32 bounds
+/// their sum amply.
+struct TransformError {
+    float condition = 1.0f;
+    float largest_translation = 0.0f;
+
+    void extend(const ObjectFromWorld& inverse, const glm::mat4x3& transform) {
+        condition = std::max(condition, inverse.condition);
+        for (int a = 0; a < 3; ++a) {
+            largest_translation = std::max(largest_translation, std::abs(transform[3][a]));
+        }
+    }
+    void apply(TreeView& top) const {
+        top.slack = 32.0f / 16777216.0f * condition;
+        top.reach = largest_translation;
+        for (int a = 0; a < 3; ++a) {
+            top.reach = std::max({top.reach, std::abs(top.lower[a]), std::abs(top.upper[a])});
+        }
+        top.reach *= 2.0f;
+    }
+};
+
+void build_top(std::span<const Instance> instances, const BuildOptions& options, SceneAccel& out) {
+    AlignedVector<Reference> references;
+    std::vector<InstanceView> views(instances.size());
+    TransformError error;
+    for (std::size_t i = 0; i < instances.size(); ++i) {
+        const auto id = static_cast<std::uint32_t>(i);
+        const Instance& instance = instances[i];
+        const Tree& tree = out.trees[instance.mesh_id];
+        const std::string what = "transform of instance " + std::to_string(i);
+        const ObjectFromWorld inverse = invert(instance.world_from_object, what.c_str());
+        std::copy_n(&inverse.row[0][0], 12, &views[i].object_from_world[0][0]);
+        views[i].instance_id = id;
+        views[i].tree = tree.view();
+        out.mesh_of_instance.push_back(instance.mesh_id);
+        const Bounds3f box = transform(instance.world_from_object, tree.bounds);
+        if (box.empty()) continue;
+        error.extend(inverse, instance.world_from_object);
+        references.push_back({box.lower, id, box.upper});
+    }
+    BuildOptions top_options = options;
+    top_options.max_leaf_size = 1;
+    const Hierarchy hierarchy =
+        build_bvh_sah(std::move(references), top_options, Parallel(options.threads));
+    out.top = make_tree(hierarchy, top_options);
+    for (const Reference& r : hierarchy.references) out.instances.push_back(views[r.id]);
+    out.view.top = out.top.view();
+    error.apply(out.view.top);
+}
+
+}  // namespace
+
+std::shared_ptr<const SceneAccel> build_scene_accel(std::span<const TriangleMesh> meshes,
+                                                    std::span<const Instance> instances,
+                                                    const BuildOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    const auto out = std::make_shared<SceneAccel>();
+    build_trees(meshes, options, *out);
+    build_top(instances, options, *out);
+    out->stats.bytes += out->top.stats.bytes + out->instances.size() * sizeof(InstanceView) +
+                        out->mesh_of_instance.size() * sizeof(std::uint32_t);
+    SceneView& view = out->view;
+    view.instances = out->instances.data();
+    view.instance_count = static_cast<std::uint32_t>(out->instances.size());
+    view.mesh_of_instance = out->mesh_of_instance.data();
+    view.is_single_mesh =
+        instances.size() == 1 && view.instance_count == 1 &&
+        instances[0].world_from_object == glm::mat4x3(1.0f);
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    out->stats.seconds = elapsed.count();
+    return out;
+}
+
+}  // namespace packet

@@ -1,0 +1,32 @@
+// The order in which an image's rays are traced if they come in scanline order: square tiles, and in
+// them squares of 4 x 4, so that a packet of 16 is such a square and one of 8 is half of it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace packet {
+
+class PixelOrder {
+public:
+    static constexpr std::size_t kTileSize = 32;
+    static constexpr std::size_t kSquareSize = 4;
+    using Indices = std::array<std::uint32_t, kTileSize * kTileSize>;
+
+    /// `count` rays, `width` to a line; the last line may be short. A width of 0, or one that does
+    /// not leave two lines, or that 32 bits cannot index, means no image.
+    PixelOrder(std::size_t count, int width) noexcept;
+
+    [[nodiscard]] bool is_image() const noexcept { return width_ != 0; }
+    [[nodiscard]] std::size_t tile_count() const noexcept { return tiles_x_ * tiles_y_; }
+    /// The ray that a tile's indices count from.
+    [[nodiscard]] std::size_t first_ray(std::size_t tile) const noexcept;
+    /// Fills in the tile's rays, relative to first_ray(), and returns their number.
+    std::size_t fill(std::size_t tile, Indices& out) const noexcept;
+
+private:
+    std::size_t count_ = 0, width_ = 0, tiles_x_ = 0, tiles_y_ = 0;
+};
+
+}  // namespace packet

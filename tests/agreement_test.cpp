@@ -1,0 +1,213 @@
+// Every structure, mode, width, instruction set and number of threads against the oracle.
+#include "configurations.h"
+#include "generate.h"
+#include "test_rays.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+using namespace packet;
+using namespace packet::test;
+
+TEST_SUITE_BEGIN("agreement");
+
+TEST_CASE("a small scene of every kind [baseline]") {
+    for (const tools::SceneKind& kind : tools::kSceneKinds) {
+        Scene scene = make_scene(kind.make(500, 3));
+        const auto rays = random_rays(scene.bounds(), 1000, 17);
+        check_agreement(scene, rays, std::string(kind.name));
+    }
+}
+
+TEST_CASE("200 random soups") {
+    for (std::uint64_t seed = 0; seed < 200; ++seed) {
+        Scene scene = make_scene(tools::make_soup(1 + seed * 7 % 101, seed));
+        const auto rays = random_rays(scene.bounds(), 4096, seed + 1000);
+        check_agreement(scene, rays, "soup of seed " + std::to_string(seed));
+    }
+}
+
+TEST_CASE("larger scenes of every kind") {
+    for (const tools::SceneKind& kind : tools::kSceneKinds) {
+        Scene scene = make_scene(kind.make(20000, 5));
+        const auto rays = random_rays(scene.bounds(), 2048, 23);
+        check_agreement(scene, rays, std::string(kind.name));
+    }
+}
+
+TEST_CASE("rays at every vertex, edge and interior of a grid") {
+    const glm::vec3 u(0.25f, 0.01f, 0.0f), v(-0.02f, 0.31f, 0.1f);
+    TriangleMesh mesh = make_grid(12, 12, {-1.3f, -2.1f, 0.4f}, u, v);
+    const auto rays = aim_at_features({0.1f, 0.3f, -3.7f}, mesh.view());
+    const Oracle oracle(make_scene(mesh));
+    std::size_t inner_misses = 0;
+    for (std::size_t i = mesh.positions.size(); i < rays.size(); ++i) {
+        inner_misses += !oracle.any(rays[i]);  // outer edges may be missed, by rounding
+    }
+    CHECK(inner_misses <= 24);
+    check_agreement(make_scene(mesh), rays, "grid");
+}
+
+TEST_CASE("rays in the planes of boxes, along axes, and starting on them") {
+    TriangleMesh mesh = make_grid(8, 8, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+    const TriangleMesh wall = make_grid(8, 8, {0, 0, 0}, {0, 1, 0}, {0, 0, 1});
+    const auto offset = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), wall.positions.begin(), wall.positions.end());
+    for (const glm::uvec3& t : wall.triangles) mesh.triangles.push_back(t + offset);
+    std::vector<Ray> rays;
+    for (int axis = 0; axis < 3; ++axis) {
+        for (float x = -1.0f; x <= 9.0f; x += 0.5f) {
+            for (float y = -1.0f; y <= 9.0f; y += 0.5f) {
+                for (const float start : {-2.0f, 0.0f, 8.0f, 10.0f}) {
+                    Ray ray;
+                    ray.org[axis] = start;
+                    ray.org[(axis + 1) % 3] = x;
+                    ray.org[(axis + 2) % 3] = y;
+                    ray.dir = glm::vec3(0.0f);
+                    ray.dir[axis] = start > 4.0f ? -1.0f : 1.0f;
+                    rays.push_back(ray);
+                    ray.dir[(axis + 1) % 3] = -0.0f;
+                    ray.dir[(axis + 2) % 3] = 1e-30f;
+                    rays.push_back(ray);
+                }
+            }
+        }
+    }
+    check_agreement(make_scene(std::move(mesh)), rays, "planes");
+}
+
+TEST_CASE("slivers") {
+    tools::Random random(77);
+    TriangleMesh mesh;
+    for (std::uint32_t i = 0; i < 300; ++i) {
+        const glm::vec3 p = random.point(), along = random.direction();
+        mesh.positions.insert(mesh.positions.end(),
+                              {p, p + along, p + 0.5f * along + 1e-6f * random.direction()});
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    Scene scene = make_scene(mesh);
+    auto rays = random_rays(scene.bounds(), 2048, 5);
+    const auto aimed = aim_at_features({0.4f, 0.5f, -2.0f}, mesh.view());
+    rays.insert(rays.end(), aimed.begin(), aimed.end());
+    check_agreement(scene, rays, "slivers");
+}
+
+TEST_CASE("nested spheres and equal triangles: ties go to the smallest prim_id") {
+    TriangleMesh mesh;
+    for (const float radius : {1.0f, 0.5f, 0.5f, 0.25f, 1.0f}) {
+        const TriangleMesh sphere = tools::make_sphere(128);
+        const auto offset = static_cast<std::uint32_t>(mesh.positions.size());
+        for (const glm::vec3& p : sphere.positions) mesh.positions.push_back(radius * p);
+        for (const glm::uvec3& t : sphere.triangles) mesh.triangles.push_back(t + offset);
+    }
+    auto rays = aim_at_features({0.0f, 0.0f, 0.0f}, mesh.view());
+    for (const Ray& ray : aim_at_features({3.0f, 0.1f, 0.2f}, mesh.view())) rays.push_back(ray);
+    check_agreement(make_scene(std::move(mesh)), rays, "nested spheres");
+}
+
+TEST_CASE("hundreds of identical triangles") {
+    TriangleMesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.triangles.assign(700, {0, 1, 2});
+    Scene scene = make_scene(mesh);
+    Bounds3f box = scene.bounds();
+    box.extend(glm::vec3(0, 0, 1));
+    check_agreement(scene, random_rays(box, 1024, 9), "identical triangles");
+}
+
+TEST_CASE("sizes from 1e-15 to 1e15, near and far from the origin") {
+    for (const float scale : {1e-15f, 1e-9f, 1e-3f, 1e3f, 1e9f, 1e15f}) {
+        for (const float shift : {0.0f, 1.0f, 300.0f}) {
+            TriangleMesh mesh = tools::make_sphere(200);
+            for (glm::vec3& p : mesh.positions) p = scale * (p + shift * glm::vec3(1, -0.7f, 0.3f));
+            Scene scene = make_scene(mesh);
+            check_agreement(scene, random_rays(scene.bounds(), 512, 31),
+                            "scale " + std::to_string(scale) + " shift " + std::to_string(shift));
+        }
+    }
+}
+
+TEST_CASE("numbers beyond the exact range neither crash nor yield NaN") {
+    for (const float scale : {1e-42f, 1e-30f, 1e-20f, 1e17f, 1.5e18f}) {
+        TriangleMesh mesh = tools::make_sphere(200);
+        for (glm::vec3& p : mesh.positions) p *= scale;
+        Scene scene = make_scene(mesh);
+        auto rays = random_rays(scene.bounds(), 512, 37);
+        for (std::size_t i = 0; i < rays.size(); i += 5) rays[i].org *= 1e15f;
+        for (std::size_t i = 1; i < rays.size(); i += 5) rays[i].dir *= 1e37f;
+        for (std::size_t i = 2; i < rays.size(); i += 5) rays[i].dir *= 1e-37f;
+        for (const Hit& hit : Oracle(scene).closest(rays)) {
+            REQUIRE(!std::isnan(hit.t + hit.u + hit.v));
+        }
+        check_agreement(scene, rays, "scale " + std::to_string(scale));
+    }
+}
+
+TEST_CASE("rays that are no rays hit nothing") {
+    const float nan = std::nanf(""), inf = INFINITY;
+    Scene scene = make_scene(tools::make_sphere(500));
+    std::vector<Ray> rays;
+    for (int component = 0; component < 8; ++component) {
+        for (const float bad : {nan, inf, -inf}) {
+            Ray ray = aim({0.1f, 0.2f, 0.3f}, {0.5f, 0.7f, -0.3f});
+            float* const parts[8] = {&ray.org.x, &ray.org.y, &ray.org.z, &ray.tnear,
+                                     &ray.dir.x, &ray.dir.y, &ray.dir.z, &ray.tfar};
+            *parts[component] = bad;
+            rays.push_back(ray);
+            const bool is_tnear = component == 3 && bad == -inf, is_tfar = component == 7 && bad == inf;
+            CHECK(Oracle(scene).any(ray) == (is_tnear || is_tfar));
+        }
+    }
+    rays.push_back(aim({0, 0, 0}, {0, 0, 0}));
+    rays.push_back(aim({0, 0, 0}, {0, 0, 1e-40f}));
+    rays.back().tfar = inf;
+    rays.push_back(aim({0, 0, 0}, {0, 0, 1}));
+    rays.back().tnear = 2.0f, rays.back().tfar = 1.5f;
+    for (std::size_t i = rays.size() - 3; i < rays.size(); ++i) CHECK(!Oracle(scene).any(rays[i]));
+    check_agreement(scene, rays, "no rays");
+}
+
+TEST_CASE("the segment is closed at both ends") {
+    TriangleMesh mesh = make_grid(1, 1, {-1, -1, 2}, {2, 0, 0}, {0, 2, 0});
+    std::vector<Ray> rays;
+    const float below = std::nextafter(2.0f, 0.0f), above = std::nextafter(2.0f, 3.0f);
+    const float ends[][2] = {{0, 2}, {2, 2}, {2, 3}, {0, below}, {above, 3}, {-5, 2}};
+    for (const auto& [tnear, tfar] : ends) {
+        Ray ray = aim({0.3f, 0.2f, 0}, {0.3f, 0.2f, 1});
+        ray.tnear = tnear, ray.tfar = tfar;
+        rays.push_back(ray);
+    }
+    const Oracle oracle(make_scene(mesh));
+    const bool want[] = {true, true, true, false, false, true};
+    for (std::size_t i = 0; i < rays.size(); ++i) CHECK(oracle.any(rays[i]) == want[i]);
+    check_agreement(make_scene(std::move(mesh)), rays, "ends");
+}
+
+TEST_CASE("instances under any affine transform") {
+    tools::Random random(4);
+    Scene scene;
+    scene.add_mesh(tools::make_sphere(72));
+    scene.add_mesh(tools::make_soup(60, 2));
+    scene.add_mesh(tools::make_city(200, 2));
+    for (std::uint32_t i = 0; i < 60; ++i) {
+        glm::mat4x3 m;
+        for (int column = 0; column < 3; ++column) m[column] = random.direction();
+        m[3] = 10.0f * random.point();
+        if (i % 4 == 0) m[0] = -m[0];
+        if (i % 5 == 0) m[1] *= 0.01f;
+        scene.add_instance(i % 3, m);
+    }
+    check_agreement(scene, random_rays(scene.bounds(), 4096, 12), "instances");
+}
+
+TEST_CASE("coinciding instances: ties go to the smallest instance_id") {
+    Scene scene;
+    const auto mesh = scene.add_mesh(tools::make_sphere(72));
+    for (int i = 0; i < 5; ++i) scene.add_instance(mesh, glm::mat4x3(2.0f));
+    check_agreement(scene, random_rays(scene.bounds(), 1024, 12), "coinciding instances");
+    scene.commit();
+    CHECK(trace_closest(scene, aim({0, 0, 0}, {0.3f, 0.2f, 0.9f})).instance_id == 0);
+}
+
+TEST_SUITE_END();

@@ -1,0 +1,88 @@
+#include "configurations.h"
+
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <iostream>
+
+namespace packet::test {
+
+std::string Configuration::name() const {
+    return std::string(to_string(accel)) + " " + std::string(to_string(mode)) + " " +
+           std::string(to_string(isa)) + " threads=" + std::to_string(threads);
+}
+
+TraceOptions Configuration::trace_options() const {
+    TraceOptions options;
+    options.mode = mode;
+    options.isa = isa;
+    options.threads = threads;
+    return options;
+}
+
+static void report_skipped_isas() {
+    static const bool once = [] {
+        for (const IsaId isa : built_isas()) {
+            if (!cpu_supports(isa)) std::cout << "skipped: " << to_string(isa) << " (not this CPU)\n";
+        }
+        return true;
+    }();
+    (void)once;
+}
+
+std::vector<Configuration> all_configurations(AccelKind accel) {
+    report_skipped_isas();
+    std::vector<Configuration> out;
+    for (const ModeName& mode : mode_names()) {
+        for (const IsaId isa : built_isas()) {
+            if (cpu_supports(isa)) out.push_back({accel, mode.mode, isa, 1});
+        }
+        for (const int threads : {2, 3}) out.push_back({accel, mode.mode, default_isa(), threads});
+    }
+    return out;
+}
+
+std::size_t count_differences(std::span<const Ray> rays, std::span<const Hit> want,
+                              std::span<const Hit> got) {
+    std::size_t differences = 0;
+    for (std::size_t i = 0; i < want.size(); ++i) {
+        if (std::memcmp(&want[i], &got[i], sizeof(Hit)) == 0) continue;
+        if (differences++ != 0) continue;
+        const Ray& r = rays[i];
+        MESSAGE("ray " << i << " org " << r.org.x << " " << r.org.y << " " << r.org.z << " dir "
+                       << r.dir.x << " " << r.dir.y << " " << r.dir.z << " [" << r.tnear << ", "
+                       << r.tfar << "]: want t " << want[i].t << " prim " << want[i].prim_id
+                       << " instance " << want[i].instance_id << ", got t " << got[i].t << " prim "
+                       << got[i].prim_id << " instance " << got[i].instance_id);
+    }
+    return differences;
+}
+
+static void check_configuration(const Scene& scene, std::span<const Ray> rays,
+                                std::span<const Hit> want, const Configuration& configuration) {
+    INFO(configuration.name());
+    std::vector<Hit> hits(rays.size());
+    trace_closest(scene, rays, hits, configuration.trace_options());
+    CHECK(count_differences(rays, want, hits) == 0);
+
+    std::vector<std::uint8_t> occluded(rays.size(), 7);
+    trace_any(scene, rays, occluded, configuration.trace_options());
+    std::size_t different = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) different += occluded[i] != want[i].is_hit();
+    CHECK(different == 0);
+}
+
+void check_agreement(Scene scene, std::span<const Ray> rays, const std::string& label) {
+    INFO(label);
+    const std::vector<Hit> want = Oracle(scene).closest(rays);
+    for (const AccelName& accel : accel_names()) {
+        BuildOptions options;
+        options.accel = accel.kind;
+        scene.commit(options);
+        for (const Configuration& configuration : all_configurations(accel.kind)) {
+            check_configuration(scene, rays, want, configuration);
+        }
+    }
+}
+
+}  // namespace packet::test

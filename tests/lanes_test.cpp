@@ -1,0 +1,120 @@
+// Lanes of every instruction set, operation by operation and lane by lane, against scalar code.
+#include "lane_probe.h"
+#include "random.h"
+
+#include <packet/isa.h>
+
+#include <doctest/doctest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+using namespace packet;
+using namespace packet::test;
+
+namespace {
+
+constexpr float kMean[] = {0.0f, -0.0f, 1.0f, -1.0f, INFINITY, -INFINITY, NAN, 1e-45f, -1e-45f,
+                           1.1754944e-38f, 3.4028235e38f, -3.4028235e38f, 1.0000001f, 0.99999994f};
+
+LaneInput random_input(tools::Random& random) {
+    LaneInput in;
+    const auto number = [&] {
+        if (random.next() % 3 == 0) return kMean[random.next() % std::size(kMean)];
+        return std::bit_cast<float>(static_cast<std::uint32_t>(random.next()));
+    };
+    for (int lane = 0; lane < kMostLanes; ++lane) {
+        in.a[lane] = number();
+        in.b[lane] = random.next() % 4 == 0 ? in.a[lane] : number();
+        in.i[lane] = static_cast<std::int32_t>(random.next() >> 32);
+        in.j[lane] = random.next() % 4 == 0 ? in.i[lane] : static_cast<std::int32_t>(random.next());
+    }
+    in.bits = static_cast<std::uint32_t>(random.next() >> 40) & 0xFFFFu;
+    return in;
+}
+
+/// Equal bits, or both NaN: which NaN comes out is no matter.
+bool same(float x, float y) {
+    return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y) ||
+           (std::isnan(x) && std::isnan(y));
+}
+
+bool bit(std::uint32_t bits, int lane) { return (bits >> lane & 1u) != 0; }
+
+void check_floats(const LaneInput& in, const LaneOutput& out, int lane) {
+    const float a = in.a[lane], b = in.b[lane];
+    CHECK(same(out.add[lane], a + b));
+    CHECK(same(out.sub[lane], a - b));
+    CHECK(same(out.mul[lane], a * b));
+    CHECK(same(out.div[lane], a / b));
+    CHECK(same(out.abs[lane], std::fabs(a)));
+    CHECK(same(out.min[lane], a < b ? a : b));
+    CHECK(same(out.max[lane], a > b ? a : b));
+    CHECK(same(out.broadcast[lane], in.a[0]));
+    CHECK(same(out.select[lane], bit(in.bits, lane) ? a : b));
+    CHECK(same(out.masked_store[lane], bit(in.bits, lane) ? a : b));
+    CHECK(bit(out.less, lane) == (a < b));
+    CHECK(bit(out.less_equal, lane) == (a <= b));
+    CHECK(bit(out.greater, lane) == (a > b));
+    CHECK(bit(out.greater_equal, lane) == (a >= b));
+    CHECK(bit(out.equal, lane) == (a == b));
+}
+
+void check_others(const LaneInput& in, const LaneOutput& out, int lane) {
+    const std::int32_t i = in.i[lane], j = in.j[lane];
+    const bool m = bit(in.bits, lane), less = in.a[lane] < in.b[lane];
+    CHECK(out.int_select[lane] == (m ? i : j));
+    CHECK(out.int_broadcast[lane] == in.i[0]);
+    CHECK(out.int_masked_store[lane] == (m ? i : j));
+    CHECK(bit(out.int_less, lane) == (i < j));
+    CHECK(bit(out.int_less_equal, lane) == (i <= j));
+    CHECK(bit(out.int_equal, lane) == (i == j));
+    CHECK(bit(out.both, lane) == (less && m));
+    CHECK(bit(out.either, lane) == (less || m));
+    CHECK(bit(out.invert, lane) == !m);
+    CHECK(bit(out.from_bits, lane) == m);
+}
+
+void check_lanes(LaneProbe probe, int lanes) {
+    tools::Random random(static_cast<std::uint64_t>(lanes));
+    for (int round = 0; round < 500; ++round) {
+        CAPTURE(round);
+        const LaneInput in = random_input(random);
+        LaneOutput out;
+        std::memset(&out, 0, sizeof(out));
+        probe(in, out);
+        for (int lane = 0; lane < lanes; ++lane) {
+            CAPTURE(lane);
+            check_floats(in, out, lane);
+            check_others(in, out, lane);
+        }
+        const std::uint32_t mask = in.bits & ((1u << lanes) - 1);
+        CHECK(out.from_bits == mask);
+        CHECK(out.any == (mask != 0));
+        CHECK(out.none == (mask == 0));
+        CHECK(out.count == static_cast<std::uint32_t>(std::popcount(mask)));
+    }
+}
+
+void check_isa(IsaId isa, LaneProbes (*probes)()) {
+    if (!cpu_supports(isa)) {
+        MESSAGE("skipped: " << to_string(isa) << " (not this CPU)");
+        return;
+    }
+    check_lanes(probes().lanes1, 1);
+    check_lanes(probes().lanes8, 8);
+    check_lanes(probes().lanes16, 16);
+}
+
+}  // namespace
+
+TEST_CASE("scalar lanes compute as scalars [baseline]") {
+    check_isa(IsaId::kScalar, lane_probes_scalar);
+}
+TEST_CASE("sse42 lanes compute as scalars [baseline]") {
+    check_isa(IsaId::kSse42, lane_probes_sse42);
+}
+TEST_CASE("avx2 lanes compute as scalars") { check_isa(IsaId::kAvx2, lane_probes_avx2); }
+TEST_CASE("avx512 lanes compute as scalars") { check_isa(IsaId::kAvx512, lane_probes_avx512); }

@@ -1,0 +1,64 @@
+// packet render: an image of a scene.
+#include "commands.h"
+#include "options.h"
+#include "render.h"
+
+#include <packet/gltf.h>
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+namespace packet::tools {
+namespace {
+
+constexpr int kMaxSamples = 65536;  // more would not show in 8 bits
+
+struct RenderOptions {
+    std::string scene, output;
+    const Shading* shading = &shadings().front();
+    int samples = 0;
+    CameraOptions camera;
+    CommonOptions common;
+};
+
+void run(const RenderOptions& options) {
+    OutputFile file(options.output);  // first, so that a bad name is told before the work is done
+    Scene scene = load_gltf(options.scene).scene;
+    const Camera camera(options.camera, scene.bounds());
+    scene.commit(options.common.build);
+
+    const auto start = std::chrono::steady_clock::now();
+    const Image image =
+        render(scene, camera, *options.shading, options.samples, options.common.trace);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    write_png(std::move(file), image);
+    print(fmt::format("{}: {} x {} pixels, {}, {:.2f} s\n", options.output, image.size.width,
+                      image.size.height, options.shading->name, seconds.count()));
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& program) {
+    CLI::App& app = *program.add_subcommand("render", "Render an image of a scene");
+    const auto options = std::make_shared<RenderOptions>();
+    app.add_option("scene", options->scene, "The scene, .gltf or .glb")
+        ->required()
+        ->type_name("SCENE");
+    app.add_option("-o,--output", options->output, "The image")->required()->type_name("IMAGE.png");
+    add_name_option(app, "--shading", "What is shown", list_names(shadings()),
+                    [options = options.get()](std::string_view name) {
+                        options->shading = &find_name("shading", name, shadings());
+                    })
+        ->default_str("normal");
+    app.add_option("--samples", options->samples, "Rays a pixel, 0 for the shading's own number")
+        ->check(CLI::Range(0, kMaxSamples))
+        ->capture_default_str();
+    add_camera_options(app, options->camera);
+    add_common_options(app, options->common);
+    app.callback([options] { run(*options); });
+}
+
+}  // namespace packet::tools

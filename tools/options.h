@@ -1,0 +1,41 @@
+// Options that several commands share.
+#pragma once
+
+#include "camera.h"
+#include "names.h"
+
+#include <packet/accel.h>
+#include <packet/trace.h>
+
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace packet::tools {
+
+/// How much time a build may take for faster tracing.
+enum class Quality : std::uint8_t {
+    kBalanced
+};
+
+inline constexpr Named<Quality> kQualities[] = {{Quality::kBalanced, "balanced"}};
+
+struct CommonOptions {
+    BuildOptions build;
+    Quality quality = Quality::kBalanced;
+    TraceOptions trace;
+};
+
+/// Adds an option whose value is a name. `help` is followed by the list of `names`. `take` throws
+/// an Error if it does not know the name it is given.
+CLI::Option* add_name_option(CLI::App& app, const std::string& flags, const std::string& help,
+                             const std::string& names, std::function<void(std::string_view)> take);
+
+// What these add writes into the second argument, which must outlive the parse.
+void add_common_options(CLI::App& app, CommonOptions& options);
+void add_camera_options(CLI::App& app, CameraOptions& options);
+
+}  // namespace packet::tools
