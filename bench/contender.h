@@ -17,10 +17,7 @@
 
 namespace packet::bench {
 
-enum class Side : std::uint8_t {
-    kOurs,
-    kEmbree
-};
+enum class Side : std::uint8_t { kOurs, kEmbree };
 
 /// Hits for Query::kClosest, bytes for Query::kAny; the other one is empty.
 struct Answers {

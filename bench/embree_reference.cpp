@@ -188,20 +188,13 @@ void trace_some(RTCScene scene, EmbreeMode mode, std::span<const Ray> rays,
     const Call plain(scene, false);
     const Call coherent(scene, true);
     switch (mode) {
-        case EmbreeMode::k1:
-            return trace_single(plain, rays, answers);
-        case EmbreeMode::k8:
-            return trace_packets<Eight, 8>(plain, rays, answers);
-        case EmbreeMode::k8Coherent:
-            return trace_packets<Eight, 8>(coherent, rays, answers);
-        case EmbreeMode::k16:
-            return trace_packets<Sixteen, 16>(plain, rays, answers);
-        case EmbreeMode::k16Coherent:
-            return trace_packets<Sixteen, 16>(coherent, rays, answers);
-        case EmbreeMode::k1M:
-            return trace_streams(plain, rays, answers);
-        case EmbreeMode::k1MCoherent:
-            return trace_streams(coherent, rays, answers);
+        case EmbreeMode::k1: return trace_single(plain, rays, answers);
+        case EmbreeMode::k8: return trace_packets<Eight, 8>(plain, rays, answers);
+        case EmbreeMode::k8Coherent: return trace_packets<Eight, 8>(coherent, rays, answers);
+        case EmbreeMode::k16: return trace_packets<Sixteen, 16>(plain, rays, answers);
+        case EmbreeMode::k16Coherent: return trace_packets<Sixteen, 16>(coherent, rays, answers);
+        case EmbreeMode::k1M: return trace_streams(plain, rays, answers);
+        case EmbreeMode::k1MCoherent: return trace_streams(coherent, rays, answers);
     }
 }
 
@@ -225,12 +218,9 @@ void trace_all(RTCScene scene, EmbreeMode mode, std::span<const Ray> rays,
 
 RTCBuildQuality to_embree(EmbreeQuality quality) {
     switch (quality) {
-        case EmbreeQuality::kLow:
-            return RTC_BUILD_QUALITY_LOW;
-        case EmbreeQuality::kMedium:
-            return RTC_BUILD_QUALITY_MEDIUM;
-        case EmbreeQuality::kHigh:
-            return RTC_BUILD_QUALITY_HIGH;
+        case EmbreeQuality::kLow: return RTC_BUILD_QUALITY_LOW;
+        case EmbreeQuality::kMedium: return RTC_BUILD_QUALITY_MEDIUM;
+        case EmbreeQuality::kHigh: return RTC_BUILD_QUALITY_HIGH;
     }
     return RTC_BUILD_QUALITY_MEDIUM;
 }

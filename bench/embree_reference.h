@@ -16,30 +16,15 @@ struct RTCSceneTy;
 namespace packet::bench {
 
 /// How much Embree spends on its tree. High splits triangles; low is made for animation.
-enum class EmbreeQuality : std::uint8_t {
-    kLow,
-    kMedium,
-    kHigh
-};
+enum class EmbreeQuality : std::uint8_t { kLow, kMedium, kHigh };
 
 /// Embree's default triangle test may let a ray slip between two triangles; its robust one is
 /// slower and mends most of that. Ours never does.
-enum class EmbreeTest : std::uint8_t {
-    kFast,
-    kRobust
-};
+enum class EmbreeTest : std::uint8_t { kFast, kRobust };
 
 /// How rays are handed over: one by one, in packets, or in streams (version 3 only). The coherent
 /// ones pass Embree's hint that neighbouring rays go alike.
-enum class EmbreeMode : std::uint8_t {
-    k1,
-    k8,
-    k8Coherent,
-    k16,
-    k16Coherent,
-    k1M,
-    k1MCoherent
-};
+enum class EmbreeMode : std::uint8_t { k1, k8, k8Coherent, k16, k16Coherent, k1M, k1MCoherent };
 
 struct EmbreeModeName {
     EmbreeMode mode;

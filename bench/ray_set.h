@@ -14,10 +14,7 @@
 
 namespace packet::bench {
 
-enum class Query : std::uint8_t {
-    kClosest,
-    kAny
-};
+enum class Query : std::uint8_t { kClosest, kAny };
 [[nodiscard]] std::string_view to_string(Query query) noexcept;
 
 struct RaySet {

@@ -155,7 +155,8 @@ TEST_CASE("rays that are no rays hit nothing") {
                                      &ray.dir.x, &ray.dir.y, &ray.dir.z, &ray.tfar};
             *parts[component] = bad;
             rays.push_back(ray);
-            const bool is_tnear = component == 3 && bad == -inf, is_tfar = component == 7 && bad == inf;
+            const bool is_tnear = component == 3 && bad == -inf,
+                       is_tfar = component == 7 && bad == inf;
             CHECK(Oracle(scene).any(ray) == (is_tnear || is_tfar));
         }
     }

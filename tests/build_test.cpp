@@ -108,8 +108,8 @@ TEST_CASE("a mesh without triangles, or none that can be hit, is empty and hits 
 TEST_CASE("triangles that can never be hit are skipped and counted by reason") {
     const float nan = std::nanf("");
     TriangleMesh mesh;
-    mesh.positions = {{0, 0, 0},    {1, 0, 0},         {0, 1, 0},    {nan, 0, 0},
-                      {0, 3e18f, 0}, {0, 0, INFINITY}, {2, 0, 0},    {0.1f, 0.2f, 0.3f}};
+    mesh.positions = {{0, 0, 0},     {1, 0, 0},        {0, 1, 0}, {nan, 0, 0},
+                      {0, 3e18f, 0}, {0, 0, INFINITY}, {2, 0, 0}, {0.1f, 0.2f, 0.3f}};
     mesh.triangles = {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}, {0, 1, 5}, {0, 1, 6}, {7, 7, 2}, {3, 4, 5}};
     const Tree tree = build_tree(mesh.view(), {});
     CHECK(tree.stats.skipped.non_finite == 3);

@@ -23,7 +23,8 @@ TraceOptions Configuration::trace_options() const {
 static void report_skipped_isas() {
     static const bool once = [] {
         for (const IsaId isa : built_isas()) {
-            if (!cpu_supports(isa)) std::cout << "skipped: " << to_string(isa) << " (not this CPU)\n";
+            if (!cpu_supports(isa))
+                std::cout << "skipped: " << to_string(isa) << " (not this CPU)\n";
         }
         return true;
     }();

@@ -23,8 +23,8 @@ struct Configuration {
     [[nodiscard]] TraceOptions trace_options() const;
 };
 
-/// Modes x instruction sets that this CPU runs, on one thread, and on 2 and 3 threads by the best of
-/// them. What the CPU lacks is reported once as skipped.
+/// Modes x instruction sets that this CPU runs, on one thread, and on 2 and 3 threads by the best
+/// of them. What the CPU lacks is reported once as skipped.
 [[nodiscard]] std::vector<Configuration> all_configurations(AccelKind accel);
 
 /// Places where two lists of hits differ in any bit. Reports the first as a doctest message.

@@ -1,5 +1,5 @@
-// Runs every operation of lanes.h once, for one instruction set. Compiled per instruction set, as the
-// kernels are; lanes_test.cpp compares what comes out with plain scalar code.
+// Runs every operation of lanes.h once, for one instruction set. Compiled per instruction set, as
+// the kernels are; lanes_test.cpp compares what comes out with plain scalar code.
 #pragma once
 
 #include "kernels/lanes.h"

@@ -1,3 +1,5 @@
 #include "lane_probe.h"
 
-packet::test::LaneProbes packet::test::lane_probes_avx512() { return make_lane_probes<isa::Avx512>(); }
+packet::test::LaneProbes packet::test::lane_probes_avx512() {
+    return make_lane_probes<isa::Avx512>();
+}

@@ -1,3 +1,5 @@
 #include "lane_probe.h"
 
-packet::test::LaneProbes packet::test::lane_probes_sse42() { return make_lane_probes<isa::Sse42>(); }
+packet::test::LaneProbes packet::test::lane_probes_sse42() {
+    return make_lane_probes<isa::Sse42>();
+}

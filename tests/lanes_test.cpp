@@ -16,8 +16,9 @@ using namespace packet::test;
 
 namespace {
 
-constexpr float kMean[] = {0.0f, -0.0f, 1.0f, -1.0f, INFINITY, -INFINITY, NAN, 1e-45f, -1e-45f,
-                           1.1754944e-38f, 3.4028235e38f, -3.4028235e38f, 1.0000001f, 0.99999994f};
+constexpr float kMean[] = {
+    0.0f,   -0.0f,   1.0f,           -1.0f,         INFINITY,       -INFINITY,  NAN,
+    1e-45f, -1e-45f, 1.1754944e-38f, 3.4028235e38f, -3.4028235e38f, 1.0000001f, 0.99999994f};
 
 LaneInput random_input(tools::Random& random) {
     LaneInput in;

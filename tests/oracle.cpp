@@ -117,9 +117,9 @@ Oracle::Oracle(const Scene& scene) {
         Mesh mesh;
         for (std::size_t i = 0; i < source.triangles.size(); ++i) {
             const glm::uvec3 t = source.triangles[i];
-            const Triangle triangle{{source.positions[t.x], source.positions[t.y],
-                                     source.positions[t.z]},
-                                    static_cast<std::uint32_t>(i)};
+            const Triangle triangle{
+                {source.positions[t.x], source.positions[t.y], source.positions[t.z]},
+                static_cast<std::uint32_t>(i)};
             const auto& v = triangle.v;
             if (find_fault(v[0], v[1], v[2]) != TriangleFault::kNone) continue;
             for (const glm::vec3& p : v) mesh.bounds.extend(p);

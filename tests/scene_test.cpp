@@ -141,8 +141,8 @@ TEST_CASE("an image traced by tiles visits every pixel once and gives the hits o
     std::vector<int> visits(kWidth * kHeight);
     std::vector<Hit> hits(visits.size());
     const auto ray_at = [](int x, int y) {
-        return aim({0.1f, 0.2f, 3.0f},
-                   {static_cast<float>(x) / kWidth - 0.5f, static_cast<float>(y) / kHeight - 0.5f, 0});
+        return aim({0.1f, 0.2f, 3.0f}, {static_cast<float>(x) / kWidth - 0.5f,
+                                        static_cast<float>(y) / kHeight - 0.5f, 0});
     };
     TraceStats stats;
     TraceOptions options;
@@ -173,9 +173,10 @@ TEST_CASE("an image traced by tiles visits every pixel once and gives the hits o
     }
     CHECK(stats.rays == visits.size());
     CHECK_THROWS_AS(trace_tiles(scene, 0, 5, {}, {}), Error);
-    CHECK_THROWS_WITH(trace_tiles(scene, 64, 64,
-                                  [](Tile, std::span<Ray>) { throw std::runtime_error("mine"); }, {}),
-                      "mine");
+    CHECK_THROWS_WITH(
+        trace_tiles(scene, 64, 64, [](Tile, std::span<Ray>) { throw std::runtime_error("mine"); },
+                    {}),
+        "mine");
 }
 
 TEST_CASE("statistics count work, and counting changes no hit") {
@@ -238,10 +239,11 @@ TEST_CASE("PACKET_ISA forces an instruction set; a wrong one is an error that li
     ::setenv("PACKET_ISA", "scalar", 1);
     CHECK(default_isa() == IsaId::kScalar);
     ::setenv("PACKET_ISA", "pentium", 1);
-    CHECK_THROWS_WITH_AS((void)default_isa(),
-                         "unknown instruction set in PACKET_ISA 'pentium'; valid are: scalar, sse42, "
-                         "avx2, avx512",
-                         Error);
+    CHECK_THROWS_WITH_AS(
+        (void)default_isa(),
+        "unknown instruction set in PACKET_ISA 'pentium'; valid are: scalar, sse42, "
+        "avx2, avx512",
+        Error);
     ::setenv("PACKET_ISA", kept.c_str(), 1);
     CHECK(cpu_supports(default_isa()));
 }

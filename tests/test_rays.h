@@ -60,7 +60,8 @@ namespace packet::test {
     TriangleMesh mesh;
     for (int y = 0; y <= ny; ++y) {
         for (int x = 0; x <= nx; ++x) {
-            mesh.positions.push_back(origin + static_cast<float>(x) * u + static_cast<float>(y) * v);
+            mesh.positions.push_back(origin + static_cast<float>(x) * u +
+                                     static_cast<float>(y) * v);
         }
     }
     const auto id = [nx](int x, int y) { return static_cast<std::uint32_t>(y * (nx + 1) + x); };

@@ -56,7 +56,8 @@ TEST_CASE("a 12 x 12 plane far from the origin holds rays at vertices, edges and
     TriangleMesh mesh = make_grid(12, 12, far - 6.0f * u - 6.0f * v, u, v);
     Scene scene = make_scene(mesh);
     scene.commit();
-    for (const glm::vec3& eye : {glm::vec3(0, 0, 20), glm::vec3(0, 0, -0.5f), glm::vec3(3, 2, 900)}) {
+    for (const glm::vec3& eye :
+         {glm::vec3(0, 0, 20), glm::vec3(0, 0, -0.5f), glm::vec3(3, 2, 900)}) {
         check_no_leaks(scene, aim_inside(far + eye, mesh, 12, 12));
     }
 }

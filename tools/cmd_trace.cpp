@@ -20,10 +20,7 @@
 namespace packet::tools {
 namespace {
 
-enum class Query : std::uint8_t {
-    kClosest,
-    kAny
-};
+enum class Query : std::uint8_t { kClosest, kAny };
 constexpr Named<Query> kQueries[] = {{Query::kClosest, "closest"}, {Query::kAny, "any"}};
 
 struct TraceCommand {

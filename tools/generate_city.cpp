@@ -39,7 +39,8 @@ void add_box(const glm::vec3& lower, const glm::vec3& upper, TriangleMesh& mesh)
 
 /// Where lot number `i` of a row begins.
 float lot_start(std::size_t i) {
-    return static_cast<float>(i) * kLot + static_cast<float>(i / kLotsPerBlock) * kStreet;
+    const std::size_t streets = i / kLotsPerBlock;
+    return static_cast<float>(i) * kLot + static_cast<float>(streets) * kStreet;
 }
 
 /// Many low buildings and few towers, which stand towards the centre. `place` is in [-1, 1]^2.
@@ -73,11 +74,11 @@ std::vector<Building> plan(std::size_t side, std::uint64_t seed) {
 /// Window number `i` of a building's body, floor by floor around its four faces.
 void add_window(const glm::vec3& lower, const glm::vec3& upper, std::size_t i, std::size_t columns,
                 TriangleMesh& mesh) {
-    const std::size_t face = i / columns % 4;
+    const std::size_t face = i / columns % 4, floor = i / (4 * columns);
     const int along = face < 2 ? 0 : 2, across = 2 - along;
     const float width = (upper[along] - lower[along]) / static_cast<float>(columns);
     const float start = lower[along] + static_cast<float>(i % columns) * width;
-    const float sill = lower.y + static_cast<float>(i / (4 * columns)) * kFloor + 0.9f;
+    const float sill = lower.y + static_cast<float>(floor) * kFloor + 0.9f;
     const float wall = face % 2 == 0 ? lower[across] : upper[across];
     glm::vec3 from(0.0f, sill, 0.0f), to(0.0f, sill + 1.7f, 0.0f);
     from[along] = start + 0.2f * width, to[along] = start + 0.8f * width;
@@ -104,7 +105,8 @@ void add_building(Building building, std::size_t boxes, TriangleMesh& mesh) {
     for (int i = 0; i < 4; ++i) {  // lift housing, tanks and the like
         const glm::vec2 place{random.uniform(from.x, to.x - 3.0f),
                               random.uniform(from.y, to.y - 3.0f)};
-        add(place, place + random.uniform(1.0f, 3.0f), roof, roof + random.uniform(0.5f, 3.0f));
+        const float size = random.uniform(1.0f, 3.0f), height = random.uniform(0.5f, 3.0f);
+        add(place, place + size, roof, roof + height);
     }
     const auto floors = static_cast<std::size_t>(building.height / kFloor);
     const std::size_t columns = (boxes + 4 * floors - 1) / (4 * floors);

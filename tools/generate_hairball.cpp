@@ -11,13 +11,18 @@
 namespace packet::tools {
 namespace {
 
-constexpr std::uint32_t kSides = 3;                       // the fewest that look solid all around
-constexpr std::size_t kTrianglesPerSegment = 2 * kSides;  // two a side
-constexpr std::size_t kSegments = 40;                     // of a strand: bends look round
-constexpr float kLength = 2.5f;  // of a strand, where the ball's radius is 1: most of a half turn
-constexpr float kCoverage = 0.08f;  // radius of the only strand there is; more strands are thinner
-constexpr float kBend = 0.25f;      // turn at random in a segment, in radians or so
-constexpr float kPull = 1.5f;       // turn in a segment for a distance of 1 from the shell
+// The fewest that look solid from all around.
+constexpr std::uint32_t kSides = 3;
+constexpr std::size_t kTrianglesPerSegment = std::size_t{2} * kSides;
+// Of a strand: bends look round.
+constexpr std::size_t kSegments = 40;
+// Of a strand, where the ball's radius is 1: most of a half turn.
+constexpr float kLength = 2.5f;
+// The radius of a strand if it is the only one. Many are thinner, and as much of the ball is hair.
+constexpr float kCoverage = 0.08f;
+// Turns in a segment, in radians or so: at random, and for a distance of 1 from the shell.
+constexpr float kBend = 0.25f;
+constexpr float kPull = 1.5f;
 
 /// A place along a strand, with an axis across it.
 struct Frame {

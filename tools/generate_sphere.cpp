@@ -39,14 +39,10 @@ struct Rings {
         const float rest = static_cast<float>(m) - along;
         const float y = static_cast<float>(n) - static_cast<float>(ring);
         switch (m == 0 ? 0 : place / m) {
-            case 0:
-                return {rest, y, along};
-            case 1:
-                return {-along, y, rest};
-            case 2:
-                return {-rest, y, -along};
-            default:
-                return {along, y, -rest};
+            case 0: return {rest, y, along};
+            case 1: return {-along, y, rest};
+            case 2: return {-rest, y, -along};
+            default: return {along, y, -rest};
         }
     }
 };
@@ -55,8 +51,7 @@ struct Rings {
 void add_band(const Rings& rings, std::uint32_t inner, std::uint32_t outer, TriangleMesh& mesh) {
     const std::uint32_t m = rings.radius(outer);
     const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-        if (inner > outer)
-            std::swap(b, c);  // seen from outside, the south runs the other way round
+        if (inner > outer) std::swap(b, c);  // the south runs the other way round
         mesh.triangles.emplace_back(a, b, c);
     };
     for (std::uint32_t quarter = 0; quarter < 4; ++quarter) {
@@ -85,8 +80,9 @@ TriangleMesh make_sphere(std::size_t triangle_count, std::uint64_t /*seed*/) {
         }
     }
     for (std::uint32_t ring = 0; ring < rings.n; ++ring) add_band(rings, ring, ring + 1, mesh);
-    for (std::uint32_t ring = rings.n; ring < 2 * rings.n; ++ring)
+    for (std::uint32_t ring = rings.n; ring < 2 * rings.n; ++ring) {
         add_band(rings, ring + 1, ring, mesh);
+    }
     return mesh;
 }
 

@@ -5,8 +5,9 @@
 
 #include <packet/error.h>
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cerrno>
@@ -68,9 +69,10 @@ private:
 };
 
 NpyHeader read_header(InputFile& file) {
-    std::array<char, 8> prefix{};
+    std::array<std::uint8_t, 8> prefix{};
     file.read(std::as_writable_bytes(std::span(prefix)));
-    if (std::string_view(prefix.data(), 6) != "\x93NUMPY") file.fail("not an NPY file");
+    constexpr std::array<std::uint8_t, 6> kMagic = {0x93, 'N', 'U', 'M', 'P', 'Y'};
+    if (!std::equal(kMagic.begin(), kMagic.end(), prefix.begin())) file.fail("not an NPY file");
     const int major = prefix[6], minor = prefix[7];
     if (major < 1 || major > 3 || minor != 0) {
         file.fail(

@@ -6,7 +6,7 @@
 
 #include <packet/isa.h>
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <charconv>
 #include <cmath>

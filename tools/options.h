@@ -17,9 +17,7 @@
 namespace packet::tools {
 
 /// How much time a build may take for faster tracing.
-enum class Quality : std::uint8_t {
-    kBalanced
-};
+enum class Quality : std::uint8_t { kBalanced };
 
 inline constexpr Named<Quality> kQualities[] = {{Quality::kBalanced, "balanced"}};
 

@@ -15,8 +15,9 @@
 namespace packet::tools {
 namespace {
 
+constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 constexpr float kAlbedo = 0.7f;
-constexpr int kMaxBounces = 6;  // what comes later is below 0.7^6, a ninth, of the sky's light
+constexpr int kMaxBounces = 6;  // what comes later is below 0.7^6 = 0.12 of the sky's light
 
 /// Light from the sky: blue above, white at the horizon, dim below, so that undersides show, and
 /// bright about a hazy sun, so that sides differ. A small sun would need many more samples.
@@ -47,9 +48,8 @@ std::vector<Path> bounce(const Sight& sight, const std::vector<Path>& paths, flo
             continue;
         }
         const Surface surface = surface_at(sight.scene, path.ray, path.hit);
-        const float unbounded = std::numeric_limits<float>::infinity();
-        survivors.push_back(
-            {path.owner, scatter(surface, unbounded, sight.randoms[path.owner]), Hit{}});
+        const Ray next = scatter(surface, kUnbounded, sight.randoms[path.owner]);
+        survivors.push_back({path.owner, next, Hit{}});
     }
     return survivors;
 }

@@ -46,8 +46,9 @@ struct View {
 /// The ray through a random point of a pixel.
 Ray jittered_ray(const Camera& camera, std::uint32_t pixel, Random random) {
     const auto width = static_cast<std::uint32_t>(camera.size().width);
-    const float x = static_cast<float>(pixel % width) + random.uniform();
-    const float y = static_cast<float>(pixel / width) + random.uniform();
+    const std::uint32_t column = pixel % width, row = pixel / width;
+    const float x = static_cast<float>(column) + random.uniform();
+    const float y = static_cast<float>(row) + random.uniform();
     return camera.ray(x, y);
 }
 

@@ -91,7 +91,7 @@ constexpr Shading kShadings[] = {{"normal", 4, shade_normal, develop_nothing},
                                  {"depth", 1, shade_depth, develop_depth},
                                  {"ao", 32, shade_occlusion, develop_nothing},
                                  {"heat", 1, shade_heat, develop_heat},
-                                 {"path", 64, shade_path, develop_light}};
+                                 {"path", 32, shade_path, develop_light}};
 
 }  // namespace
 

@@ -23,8 +23,8 @@ struct BuildOptions {
     float traversal_cost = 1.0f;
     /// Cost of testing a triangle. Only its ratio to `traversal_cost` matters.
     float intersection_cost = 1.0f;
-    /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is the
-    /// same for any number.
+    /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
+    /// the same for any number.
     int threads = 0;
 };
 

@@ -17,8 +17,9 @@ enum class IsaId : std::uint8_t { kScalar, kSse42, kAvx2, kAvx512 };
 /// Throws Error{kUnknownName} that lists the valid names.
 [[nodiscard]] IsaId parse_isa(std::string_view name);
 
-/// The instruction set used when TraceOptions names none: the environment's PACKET_ISA, else the best
-/// one this CPU supports. Throws Error{kUnknownName} or Error{kUnsupported} for a bad PACKET_ISA.
+/// The instruction set used when TraceOptions names none: the environment's PACKET_ISA, else the
+/// best one this CPU supports. Throws Error{kUnknownName} or Error{kUnsupported} for a bad
+/// PACKET_ISA.
 [[nodiscard]] IsaId default_isa();
 
 }  // namespace packet

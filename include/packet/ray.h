@@ -9,9 +9,9 @@
 
 namespace packet {
 
-/// The closed segment `org + t * dir`, `tnear <= t <= tfar`. `dir` need not be normalised: `t` counts
-/// in units of `dir`. A ray with a NaN, an infinite origin or direction, or a direction so short that
-/// 1 / dir overflows (the zero direction among them) hits nothing.
+/// The closed segment `org + t * dir`, `tnear <= t <= tfar`. `dir` need not be normalised: `t`
+/// counts in units of `dir`. A ray with a NaN, an infinite origin or direction, or a direction so
+/// short that 1 / dir overflows (the zero direction among them) hits nothing.
 struct Ray {
     glm::vec3 org{0.0f};
     float tnear = 0.0f;

@@ -24,7 +24,8 @@ struct Instance {
 };
 
 /// Meshes and instances. Fill it, commit() it, trace it; change it and commit() again. Tracing one
-/// committed scene from many threads is safe; changing it meanwhile is not. Copies share structures.
+/// committed scene from many threads is safe; changing it meanwhile is not. Copies share
+/// structures.
 class Scene {
 public:
     /// Adds a mesh and returns its `mesh_id`. It is seen only through instances.
@@ -36,7 +37,8 @@ public:
     std::uint32_t add_instance(std::uint32_t mesh_id,
                                const glm::mat4x3& world_from_object = glm::mat4x3(1.0f));
 
-    /// Builds what tracing needs. On an Error the scene stays as it was, an earlier commit included.
+    /// Builds what tracing needs. On an Error the scene stays as it was, an earlier commit
+    /// included.
     void commit(const BuildOptions& options = {});
 
     [[nodiscard]] std::span<const TriangleMesh> meshes() const noexcept { return meshes_; }

@@ -35,10 +35,10 @@ struct ModeName {
 /// Work counted while tracing.
 struct TraceStats {
     std::uint64_t rays = 0;
-    std::uint64_t nodes = 0;           ///< boxes of nodes met by a lane, summed over lanes
-    std::uint64_t triangles = 0;       ///< triangles met by a lane, summed over lanes
-    std::uint64_t lanes_active = 0;    ///< lanes that took part in box tests
-    std::uint64_t lanes_issued = 0;    ///< lanes that were paid for in box tests
+    std::uint64_t nodes = 0;         ///< boxes of nodes met by a lane, summed over lanes
+    std::uint64_t triangles = 0;     ///< triangles met by a lane, summed over lanes
+    std::uint64_t lanes_active = 0;  ///< lanes that took part in box tests
+    std::uint64_t lanes_issued = 0;  ///< lanes that were paid for in box tests
 
     TraceStats& operator+=(const TraceStats& other) noexcept;
     [[nodiscard]] double nodes_per_ray() const noexcept;
@@ -50,8 +50,8 @@ struct TraceOptions {
     Mode mode = Mode::kAuto;
     /// Threads to trace with, at most the CPU's; 0 takes all of them, 1 starts none.
     int threads = 0;
-    /// If not 0, the rays are an image's in scanline order, this many to a line. They are then traced
-    /// in square tiles, which cohere better; the hits keep the rays' order.
+    /// If not 0, the rays are an image's in scanline order, this many to a line. They are then
+    /// traced in square tiles, which cohere better; the hits keep the rays' order.
     int width = 0;
     /// Kernels to use; without a value default_isa().
     std::optional<IsaId> isa;
@@ -59,8 +59,8 @@ struct TraceOptions {
     TraceStats* stats = nullptr;
 };
 
-/// Closest hits of many rays: hits[i] belongs to rays[i]. Throws Error{kBadValue} if the spans differ
-/// in length, `threads` or `width` is negative, Error{kNotCommitted}, Error{kUnsupported}.
+/// Closest hits of many rays: hits[i] belongs to rays[i]. Throws Error{kBadValue} if the spans
+/// differ in length, `threads` or `width` is negative, Error{kNotCommitted}, Error{kUnsupported}.
 void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                    const TraceOptions& options = {});
 /// Whether anything is hit: occluded[i] is 1 if rays[i] hits something, else 0. Errors as above.

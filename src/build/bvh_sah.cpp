@@ -1,7 +1,8 @@
-// Splits a node where the expected cost of tracing it is least, among the borders of equal bins along
-// each axis; where no split pays and the leaf is small enough, it is a leaf.
+// Splits a node where the expected cost of tracing it is least, among the borders of equal bins
+// along each axis; where no split pays and the leaf is small enough, it is a leaf.
 //
-// Wald. On fast construction of SAH-based bounding volume hierarchies. Interactive Ray Tracing 2007.
+// Wald. On fast construction of SAH-based bounding volume hierarchies. Interactive Ray Tracing
+// 2007.
 #include "build/bvh_sah.h"
 
 #include "core/views.h"
@@ -28,8 +29,8 @@ using Span = std::span<Reference>;
 /// Twice the centroid: the factor cancels in everything it is used for.
 glm::vec3 centroid2(const Reference& r) { return r.lower + r.upper; }
 
-/// Maps centroids to bins. Axes along which centroids do not differ enough to be told apart in float
-/// have scale 0 and are not split.
+/// Maps centroids to bins. Axes along which centroids do not differ enough to be told apart in
+/// float have scale 0 and are not split.
 struct Binning {
     glm::vec3 origin;
     glm::vec3 scale;
@@ -83,7 +84,8 @@ public:
     Builder(AlignedVector<Reference> references, const BuildOptions& options,
             const Parallel& parallel)
         : options_(options), parallel_(parallel), references_(std::move(references)) {
-        // A subtree of n references has at most 2n - 1 nodes: its slots are known before its size is.
+        // A subtree of n references has at most 2n - 1 nodes: its slots are known before its size
+        // is.
         if (!references_.empty()) nodes_.resize(2 * references_.size() - 1);
     }
 
@@ -176,8 +178,7 @@ private:
             }
         }
         const float area = bounds.box.half_area();
-        const float leaf_cost =
-            options_.intersection_cost * area * static_cast<float>(refs.size());
+        const float leaf_cost = options_.intersection_cost * area * static_cast<float>(refs.size());
         const float split_cost =
             options_.traversal_cost * area + options_.intersection_cost * best.cost;
         if (may_be_leaf && !(split_cost < leaf_cost)) return 0;
@@ -197,7 +198,9 @@ private:
     /// Equal numbers to both sides, by centroid along the widest axis.
     static std::size_t halve(Span refs, const Bounds3f& centroids) {
         const glm::vec3 extent = centroids.extent();
-        const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+        const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
+                         : extent.y >= extent.z                       ? 1
+                                                                      : 2;
         const std::size_t half = refs.size() / 2;
         std::nth_element(refs.begin(), refs.begin() + static_cast<std::ptrdiff_t>(half), refs.end(),
                          [axis](const Reference& a, const Reference& b) {

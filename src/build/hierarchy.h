@@ -12,7 +12,7 @@ namespace packet {
 /// An inner node has two children and count 0; a leaf holds references `first` to `first + count`.
 struct BuildNode {
     Bounds3f bounds;
-    std::uint32_t first = 0;  ///< inner: index of the first child
+    std::uint32_t first = 0;   ///< inner: index of the first child
     std::uint32_t second = 0;  ///< inner: index of the second child
     std::uint32_t count = 0;
 

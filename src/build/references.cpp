@@ -6,7 +6,8 @@
 
 namespace packet {
 
-/// Triangles are classified in pieces; what a piece keeps is moved to its place once all are counted.
+/// Triangles are classified in pieces; what a piece keeps is moved to its place once all are
+/// counted.
 struct Piece {
     std::size_t kept = 0;
     Bounds3f bounds;

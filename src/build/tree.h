@@ -1,4 +1,5 @@
-// The tree that kernels walk, as the arrays of core/views.h, and how builders' hierarchies get there.
+// The tree that kernels walk, as the arrays of core/views.h, and how builders' hierarchies get
+// there.
 #pragma once
 
 #include "build/hierarchy.h"
@@ -18,16 +19,17 @@ struct Tree {
     [[nodiscard]] TreeView view() const noexcept;
 };
 
-/// Lays the hierarchy out depth first, its triangles as blocks. Leaves that fit into one block do not
-/// straddle two. Fills node, leaf, depth, byte and cost statistics. O(n), blocks in parallel.
+/// Lays the hierarchy out depth first, its triangles as blocks. Leaves that fit into one block do
+/// not straddle two. Fills node, leaf, depth, byte and cost statistics. O(n), blocks in parallel.
 [[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
                              const Parallel& parallel);
 
 /// Lays out only nodes; items of the leaves are the hierarchy's references.
 [[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options);
 
-/// Builds the structure that `options.accel` names. Triangles that can never be hit are left out and
-/// counted. The mesh may be destroyed afterwards. Throws Error as validate() and for bad options.
+/// Builds the structure that `options.accel` names. Triangles that can never be hit are left out
+/// and counted. The mesh may be destroyed afterwards. Throws Error as validate() and for bad
+/// options.
 [[nodiscard]] Tree build_tree(MeshView mesh, const BuildOptions& options);
 
 /// Throws Error{kBadValue} that names the option out of its documented range.

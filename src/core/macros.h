@@ -3,8 +3,8 @@
 
 #include <cassert>
 
-// Kernels are only fast, and their objects only hold symbols of their own ISA, if the small functions
-// they are made of leave no copy behind.
+// Kernels are only fast, and their objects only hold symbols of their own ISA, if the small
+// functions they are made of leave no copy behind.
 #define PACKET_INLINE [[gnu::always_inline]] inline
 
 // Misuse of an interface, as opposed to bad data, which throws Error.

@@ -1,5 +1,5 @@
-// The arrays that kernels walk, as plain structs of pointers and counts. Builders make them, kernels
-// read them, nobody else needs to know how they came about.
+// The arrays that kernels walk, as plain structs of pointers and counts. Builders make them,
+// kernels read them, nobody else needs to know how they came about.
 #pragma once
 
 #include <cstdint>
@@ -42,8 +42,9 @@ struct TreeView {
     std::uint32_t node_count = 0;  ///< 0: nothing to hit
     float lower[3] = {0, 0, 0};    ///< the box of all items
     float upper[3] = {0, 0, 0};
-    /// Boxes are taken as grown by slack * (max |corner of the tree's box - org| + reach) and an ulp
-    /// of org. This covers all rounding on the way to a hit: no box that holds one is ever missed.
+    /// Boxes are taken as grown by slack * (max |corner of the tree's box - org| + reach) and an
+    /// ulp of org. This covers all rounding on the way to a hit: no box that holds one is ever
+    /// missed.
     float slack = kBoxSlack;
     float reach = 0.0f;
 };

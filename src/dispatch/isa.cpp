@@ -16,7 +16,8 @@ struct IsaEntry {
 };
 
 bool always() noexcept { return true; }
-// Single features, each of which the kernels' flags enable: compilers differ in the names of levels.
+// Single features, each of which the kernels' flags enable: compilers differ in the names of
+// levels.
 bool has_sse42() noexcept {
     return __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
 }
@@ -47,8 +48,9 @@ void require_support(IsaId isa, const char* origin) {
         if (!entry.supported()) continue;
         supported += (supported.empty() ? "" : ", ") + std::string(entry.name);
     }
-    throw Error(ErrorCode::kUnsupported, origin + std::string(entry_of(isa).name) +
-                                             " is not supported by this CPU; it runs: " + supported);
+    throw Error(ErrorCode::kUnsupported,
+                origin + std::string(entry_of(isa).name) +
+                    " is not supported by this CPU; it runs: " + supported);
 }
 
 }  // namespace
@@ -56,9 +58,7 @@ void require_support(IsaId isa, const char* origin) {
 std::span<const IsaId> built_isas() noexcept { return kBuiltIsas; }
 bool cpu_supports(IsaId isa) noexcept { return entry_of(isa).supported(); }
 std::string_view to_string(IsaId isa) noexcept { return entry_of(isa).name; }
-IsaId parse_isa(std::string_view name) {
-    return find_by_name(kIsas, name, "instruction set").id;
-}
+IsaId parse_isa(std::string_view name) { return find_by_name(kIsas, name, "instruction set").id; }
 
 IsaId default_isa() {
     if (const char* forced = std::getenv("PACKET_ISA"); forced != nullptr && *forced != '\0') {

@@ -17,8 +17,8 @@ struct BestHits {
     using I = Int<N, Isa>;
     using M = Mask<N, Isa>;
 
-    /// Farther than this nothing counts. kNever in lanes that take no part, or no longer do: then no
-    /// comparison with it holds, and no other mask is needed.
+    /// Farther than this nothing counts. kNever in lanes that take no part, or no longer do: then
+    /// no comparison with it holds, and no other mask is needed.
     F t;
     F u, v;
     I prim_id, instance_id;

@@ -1,6 +1,7 @@
-// The slab test: where rays enter and leave a box. It is the same arithmetic for nodes of every tree
-// and for the boxes of triangles, and each step of it rounds monotonically. So a box that contains
-// another is entered no later and left no earlier, to the last bit, and skipping it loses nothing.
+// The slab test: where rays enter and leave a box. It is the same arithmetic for nodes of every
+// tree and for the boxes of triangles, and each step of it rounds monotonically. So a box that
+// contains another is entered no later and left no earlier, to the last bit, and skipping it loses
+// nothing.
 #pragma once
 
 #include "kernels/ray_setup.h"

@@ -1,5 +1,5 @@
-// Instruction sets as types. A kernel is a template over one of these, so that copies of it compiled
-// with different flags have different names and the linker can never take one for another.
+// Instruction sets as types. A kernel is a template over one of these, so that copies of it
+// compiled with different flags have different names and the linker can never take one for another.
 #pragma once
 
 namespace packet::isa {

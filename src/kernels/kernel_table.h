@@ -12,7 +12,8 @@
 
 namespace packet {
 
-/// A run of rays to trace. Ray i is rays[order ? order[i] : i], and its result goes to the same place.
+/// A run of rays to trace. Ray i is rays[order ? order[i] : i], and its result goes to the same
+/// place.
 struct TraceBatch {
     const SceneView* scene;
     const Ray* rays;

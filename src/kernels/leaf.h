@@ -1,5 +1,5 @@
-// What happens at a leaf of a mesh's tree: many rays meet its triangles one by one, a single ray meets
-// eight at once.
+// What happens at a leaf of a mesh's tree: many rays meet its triangles one by one, a single ray
+// meets eight at once.
 #pragma once
 
 #include "kernels/best_hit.h"
@@ -10,8 +10,8 @@ namespace packet {
 /// A packet meets the triangles `first` to `first + count`, each broadcast to all lanes.
 template <Query query, Directions directions, int N, class Isa>
 PACKET_INLINE void meet_triangles(const TreeView& tree, const PreparedRays<N, Isa>& ray,
-                                  std::uint32_t first, std::uint32_t count, std::int32_t instance_id,
-                                  BestHits<N, Isa>& best) {
+                                  std::uint32_t first, std::uint32_t count,
+                                  std::int32_t instance_id, BestHits<N, Isa>& best) {
     using F = Float<N, Isa>;
     for (std::uint32_t i = first; i < first + count; ++i) {
         const TriangleBlock& block = tree.blocks[i / kBlockSize];
@@ -46,7 +46,8 @@ PACKET_INLINE PreparedRays<N, Isa> broadcast(const PreparedRays<1, Isa>& ray) {
 
 /// The lane with the smallest (t, prim_id) among `bits`.
 template <int N>
-PACKET_INLINE int nearest_lane(std::uint32_t bits, const float (&t)[N], const std::int32_t* prim_id) {
+PACKET_INLINE int nearest_lane(std::uint32_t bits, const float (&t)[N],
+                               const std::int32_t* prim_id) {
     int nearest = __builtin_ctz(bits);
     for (bits &= bits - 1; bits != 0; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
@@ -55,12 +56,12 @@ PACKET_INLINE int nearest_lane(std::uint32_t bits, const float (&t)[N], const st
     return nearest;
 }
 
-/// A single ray meets the blocks that hold triangles `first` to `first + count`. Neighbours of other
-/// leaves in the same block are met along: they are triangles like any other.
+/// A single ray meets the blocks that hold triangles `first` to `first + count`. Neighbours of
+/// other leaves in the same block are met along: they are triangles like any other.
 template <Query query, Directions, class Isa>
 PACKET_INLINE void meet_triangles(const TreeView& tree, const PreparedRays<1, Isa>& ray,
-                                  std::uint32_t first, std::uint32_t count, std::int32_t instance_id,
-                                  BestHits<1, Isa>& best) {
+                                  std::uint32_t first, std::uint32_t count,
+                                  std::int32_t instance_id, BestHits<1, Isa>& best) {
     using F = Float<kBlockSize, Isa>;
     const PreparedRays<kBlockSize, Isa> wide = broadcast<kBlockSize>(ray);
     for (std::uint32_t b = first / kBlockSize; b <= (first + count - 1) / kBlockSize; ++b) {
@@ -73,8 +74,8 @@ PACKET_INLINE void meet_triangles(const TreeView& tree, const PreparedRays<1, Is
         float t[kBlockSize], u[kBlockSize], v[kBlockSize];
         hits.t.store(t), hits.u.store(u), hits.v.store(v);
         const int i = nearest_lane(bits, t, block.prim_id);
-        best.template update<query>(Mask<1, Isa>::from_bits(1), t[i], u[i], v[i],
-                                    block.prim_id[i], instance_id);
+        best.template update<query>(Mask<1, Isa>::from_bits(1), t[i], u[i], v[i], block.prim_id[i],
+                                    instance_id);
     }
 }
 

@@ -1,9 +1,10 @@
-// Walks a binary tree with a packet of rays that share one stack. A node is visited while any lane is
-// active; the child that most lanes enter first comes first; what lies behind a lane's best hit is
-// culled when it is pushed and again when it is popped. A packet of one is the single-ray walk.
+// Walks a binary tree with a packet of rays that share one stack. A node is visited while any lane
+// is active; the child that most lanes enter first comes first; what lies behind a lane's best hit
+// is culled when it is pushed and again when it is popped. A packet of one is the single-ray walk.
 //
-// Wald, Slusallek, Benthin, Wagner. Interactive rendering with coherent ray tracing. Eurographics 2001.
-// Wald, Boulos, Shirley. Ray tracing deformable scenes using dynamic bounding volume hierarchies. TOG 2007.
+// Wald, Slusallek, Benthin, Wagner. Interactive rendering with coherent ray tracing. Eurographics
+// 2001. Wald, Boulos, Shirley. Ray tracing deformable scenes using dynamic bounding volume
+// hierarchies. TOG 2007.
 #pragma once
 
 #include "kernels/best_hit.h"
@@ -26,8 +27,8 @@ PACKET_INLINE Float<N, Isa> entry(const PreparedRays<N, Isa>& ray, const Node& n
     return select(meets(ray, box, best_t), box.enter, Float<N, Isa>(__builtin_huge_valf()));
 }
 
-/// Calls leaf(first, count) for each leaf whose box a lane meets before best_t, which leaf may lower.
-/// Lanes with best_t = kNever take no part.
+/// Calls leaf(first, count) for each leaf whose box a lane meets before best_t, which leaf may
+/// lower. Lanes with best_t = kNever take no part.
 template <Directions directions, int N, class Isa, class Stats, class Leaf>
 PACKET_INLINE void walk_tree(const TreeView& tree, const PreparedRays<N, Isa>& ray,
                              const Float<N, Isa>& best_t, Stats& stats, Leaf&& leaf) {

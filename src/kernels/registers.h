@@ -36,16 +36,24 @@ struct ScalarRegister {
     PACKET_INLINE static F min(F a, F b) { return a < b ? a : b; }
     PACKET_INLINE static F max(F a, F b) { return a > b ? a : b; }
     template <class T>
-    PACKET_INLINE static M less(T a, T b) { return a < b; }
+    PACKET_INLINE static M less(T a, T b) {
+        return a < b;
+    }
     template <class T>
-    PACKET_INLINE static M less_equal(T a, T b) { return a <= b; }
+    PACKET_INLINE static M less_equal(T a, T b) {
+        return a <= b;
+    }
     template <class T>
-    PACKET_INLINE static M equal(T a, T b) { return a == b; }
+    PACKET_INLINE static M equal(T a, T b) {
+        return a == b;
+    }
     PACKET_INLINE static M both(M a, M b) { return a && b; }
     PACKET_INLINE static M either(M a, M b) { return a || b; }
     PACKET_INLINE static M invert(M a) { return !a; }
     template <class T>
-    PACKET_INLINE static T select(M m, T a, T b) { return m ? a : b; }
+    PACKET_INLINE static T select(M m, T a, T b) {
+        return m ? a : b;
+    }
     PACKET_INLINE static std::uint32_t bits(M m) { return m ? 1u : 0u; }
     PACKET_INLINE static M from_bits(std::uint32_t bits) { return (bits & 1u) != 0; }
 };
@@ -128,15 +136,13 @@ struct RegisterFor {
 };
 #if defined(__SSE4_2__)
 template <int N>
-    requires(N >= 4)
-struct RegisterFor<isa::Sse42, N> {
+requires(N >= 4) struct RegisterFor<isa::Sse42, N> {
     using Type = XsimdRegister<xsimd::sse4_2>;
 };
 #endif
 #if defined(__AVX2__)
 template <int N>
-    requires(N >= 8)
-struct RegisterFor<isa::Avx2, N> {
+requires(N >= 8) struct RegisterFor<isa::Avx2, N> {
     using Type = XsimdRegister<xsimd::fma3<xsimd::avx2>>;
 };
 #endif

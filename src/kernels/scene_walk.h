@@ -1,5 +1,6 @@
-// Walks a scene: the tree over instances, and in its leaves the trees of their meshes, with the rays
-// moved into the space of the mesh and `t` left alone. A scene that is one mesh is walked directly.
+// Walks a scene: the tree over instances, and in its leaves the trees of their meshes, with the
+// rays moved into the space of the mesh and `t` left alone. A scene that is one mesh is walked
+// directly.
 #pragma once
 
 #include "kernels/leaf.h"
@@ -19,7 +20,8 @@ PACKET_INLINE void walk_mesh_directed(const TreeView& tree, const PreparedRays<N
                           });
 }
 
-/// The lanes of `ray` that are usable in the mesh's space and still look for something meet the mesh.
+/// The lanes of `ray` that are usable in the mesh's space and still look for something meet the
+/// mesh.
 template <Query query, int N, class Isa, class Stats>
 [[gnu::noinline]] void walk_mesh(const TreeView& tree, const RayLanes<N, Isa>& ray,
                                  std::int32_t instance_id, BestHits<N, Isa>& best, Stats& stats) {
@@ -52,8 +54,8 @@ PACKET_INLINE RayLanes<N, Isa> to_object(const InstanceView& instance,
     for (int row = 0; row < 3; ++row) {
         const float* m = instance.object_from_world[row];
         out.dir[row] = F(m[0]) * world.dir[0] + F(m[1]) * world.dir[1] + F(m[2]) * world.dir[2];
-        out.org[row] = F(m[0]) * world.org[0] + F(m[1]) * world.org[1] + F(m[2]) * world.org[2] +
-                       F(m[3]);
+        out.org[row] =
+            F(m[0]) * world.org[0] + F(m[1]) * world.org[1] + F(m[2]) * world.org[2] + F(m[3]);
     }
     out.tnear = world.tnear;
     out.tfar = world.tfar;

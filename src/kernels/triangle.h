@@ -1,7 +1,7 @@
-// The watertight triangle test, in the lanes of whoever calls: many rays and one triangle, or one ray
-// and many triangles. Three edge functions of the sheared triangle tell on which side of each edge
-// the ray passes. Their signs are exact, so two triangles that share an edge never disagree about it
-// and no ray slips through between them.
+// The watertight triangle test, in the lanes of whoever calls: many rays and one triangle, or one
+// ray and many triangles. Three edge functions of the sheared triangle tell on which side of each
+// edge the ray passes. Their signs are exact, so two triangles that share an edge never disagree
+// about it and no ray slips through between them.
 //
 // Woop, Benthin, Wald. Watertight ray/triangle intersection. JCGT 2013.
 #pragma once
@@ -40,8 +40,8 @@ PACKET_INLINE float exact_sign_difference(float a, float b, float c, float d) {
     return exact > 0.0 ? kSmallest : -kSmallest;
 }
 
-/// Recomputes the edge functions of the lanes in `bits` so that zero means zero. Rare: rays that pass
-/// an edge or a corner as closely as float can tell.
+/// Recomputes the edge functions of the lanes in `bits` so that zero means zero. Rare: rays that
+/// pass an edge or a corner as closely as float can tell.
 template <int N, class Isa>
 [[gnu::noinline]] void decide_edges(const Float3<N, Isa> (&p)[3], std::uint32_t bits,
                                     Edges<N, Isa>& edges) {
@@ -94,7 +94,8 @@ PACKET_INLINE Edges<N, Isa> edge_functions(const Float3<N, Isa> (&p)[3]) {
     Edges<N, Isa> e = {p[2].x * p[1].y - p[2].y * p[1].x, p[0].x * p[2].y - p[0].y * p[2].x,
                        p[1].x * p[0].y - p[1].y * p[0].x};
     const Mask<N, Isa> undecided = (e.u == zero) | (e.v == zero) | (e.w == zero);
-    if (any(undecided)) [[unlikely]] decide_edges(p, undecided.bits(), e);
+    if (any(undecided)) [[unlikely]]
+        decide_edges(p, undecided.bits(), e);
     return e;
 }
 

@@ -11,8 +11,9 @@ namespace packet {
 static void append(TriangleMesh& out, const TriangleMesh& mesh, const glm::mat4x3& transform_) {
     const std::size_t offset = out.positions.size();
     if (offset + mesh.positions.size() > std::numeric_limits<std::uint32_t>::max()) {
-        throw Error(ErrorCode::kTooLarge,
-                    "the flattened scene has more than 2^32 - 1 vertices, by mesh '" + mesh.name + "'");
+        throw Error(
+            ErrorCode::kTooLarge,
+            "the flattened scene has more than 2^32 - 1 vertices, by mesh '" + mesh.name + "'");
     }
     const bool moved = transform_ != glm::mat4x3(1.0f);
     for (const glm::vec3& p : mesh.positions) {

@@ -52,10 +52,7 @@ Bytes view_bytes(const Document& document, int view_id, const Part& part) {
 }
 
 /// How far apart elements are: their size, or what their buffer view says.
-enum class Spacing : std::uint8_t {
-    kTight,
-    kByView
-};
+enum class Spacing : std::uint8_t { kTight, kByView };
 
 /// `count` elements of `size` bytes from `offset` on in a view. Nothing here can wrap.
 Elements find_elements(const Document& document, int view_id, std::size_t offset, std::size_t count,
@@ -117,14 +114,10 @@ struct DecodeIndex {
 template <class Use>
 auto with_index_decoder(int component_type, const Document& document, const Part& part, Use use) {
     switch (component_type) {
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-            return use(DecodeIndex<std::uint8_t>{});
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-            return use(DecodeIndex<std::uint16_t>{});
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-            return use(DecodeIndex<std::uint32_t>{});
-        default:
-            break;
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return use(DecodeIndex<std::uint8_t>{});
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return use(DecodeIndex<std::uint16_t>{});
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return use(DecodeIndex<std::uint32_t>{});
+        default: break;
     }
     document.errors.fail(part, ": component type ", component_type,
                          " is not one of 8, 16 or 32 bits without sign");
@@ -195,8 +188,7 @@ std::vector<glm::vec3> AccessorReader::read_positions(int accessor_id) {
         document_.errors.fail("accessor ", accessor_id, ": holds positions, but is no VEC3");
     }
     switch (accessor.componentType) {
-        case TINYGLTF_COMPONENT_TYPE_FLOAT:
-            return read(accessor_id, DecodeFloats{});
+        case TINYGLTF_COMPONENT_TYPE_FLOAT: return read(accessor_id, DecodeFloats{});
         case TINYGLTF_COMPONENT_TYPE_BYTE:
             return read(accessor_id, DecodeIntegers<std::int8_t>{is_normalized});
         case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
@@ -205,8 +197,7 @@ std::vector<glm::vec3> AccessorReader::read_positions(int accessor_id) {
             return read(accessor_id, DecodeIntegers<std::int16_t>{is_normalized});
         case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
             return read(accessor_id, DecodeIntegers<std::uint16_t>{is_normalized});
-        default:
-            break;
+        default: break;
     }
     document_.errors.fail("accessor ", accessor_id, ": holds positions of component type ",
                           accessor.componentType, ", which is neither float nor 8 or 16 bits");

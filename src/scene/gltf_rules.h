@@ -11,24 +11,10 @@
 
 namespace packet::gltf {
 
-enum class Kind : std::uint8_t {
-    kObject,
-    kArray,
-    kString,
-    kBool,
-    kNumber,
-    kIndex,
-    kSize
-};
-enum class Need : std::uint8_t {
-    kOptional,
-    kRequired
-};
+enum class Kind : std::uint8_t { kObject, kArray, kString, kBool, kNumber, kIndex, kSize };
+enum class Need : std::uint8_t { kOptional, kRequired };
 /// Whether a value goes into the JSON for tinygltf or into FilteredJson's own fields.
-enum class Use : std::uint8_t {
-    kModel,
-    kField
-};
+enum class Use : std::uint8_t { kModel, kField };
 
 struct Rule {
     std::string_view path;

@@ -20,15 +20,15 @@ void validate(MeshView mesh) {
         for (int corner = 0; corner < 3; ++corner) {
             const std::uint32_t vertex = mesh.triangles[i][corner];
             if (vertex < mesh.positions.size()) continue;
-            throw Error(ErrorCode::kBadIndex, "triangle " + std::to_string(i) + " refers to vertex " +
-                                                  std::to_string(vertex) + " of " +
-                                                  std::to_string(mesh.positions.size()));
+            throw Error(ErrorCode::kBadIndex, "triangle " + std::to_string(i) +
+                                                  " refers to vertex " + std::to_string(vertex) +
+                                                  " of " + std::to_string(mesh.positions.size()));
         }
     }
 }
 
-/// Whether a * b == c * d, exactly. Rounding is monotone, so products that round to different numbers
-/// differ; if they round to the same, what was rounded off decides.
+/// Whether a * b == c * d, exactly. Rounding is monotone, so products that round to different
+/// numbers differ; if they round to the same, what was rounded off decides.
 static bool products_equal(double a, double b, double c, double d) noexcept {
     const double ab = a * b, cd = c * d;
     return ab == cd && std::fma(a, b, -ab) == std::fma(c, d, -cd);

@@ -105,9 +105,8 @@ std::shared_ptr<const SceneAccel> build_scene_accel(std::span<const TriangleMesh
     view.instances = out->instances.data();
     view.instance_count = static_cast<std::uint32_t>(out->instances.size());
     view.mesh_of_instance = out->mesh_of_instance.data();
-    view.is_single_mesh =
-        instances.size() == 1 && view.instance_count == 1 &&
-        instances[0].world_from_object == glm::mat4x3(1.0f);
+    view.is_single_mesh = instances.size() == 1 && view.instance_count == 1 &&
+                          instances[0].world_from_object == glm::mat4x3(1.0f);
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     out->stats.seconds = elapsed.count();
     return out;

@@ -1,5 +1,6 @@
-// Spreads loops and pairs of tasks over threads. With one thread everything runs on the caller's, and
-// TBB is not touched; with more, in an arena of that many, so that no global setting is changed.
+// Spreads loops and pairs of tasks over threads. With one thread everything runs on the caller's,
+// and TBB is not touched; with more, in an arena of that many, so that no global setting is
+// changed.
 #pragma once
 
 #include <oneapi/tbb/parallel_for.h>
@@ -11,7 +12,8 @@
 
 namespace packet {
 
-/// The number of threads that `requested` (0: all) comes to, at most those of the CPU. Throws Error{kBadValue} if negative.
+/// The number of threads that `requested` (0: all) comes to, at most those of the CPU. Throws
+/// Error{kBadValue} if negative.
 [[nodiscard]] int thread_count(int requested);
 
 class Parallel {

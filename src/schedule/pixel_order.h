@@ -1,5 +1,5 @@
-// The order in which an image's rays are traced if they come in scanline order: square tiles, and in
-// them squares of 4 x 4, so that a packet of 16 is such a square and one of 8 is half of it.
+// The order in which an image's rays are traced if they come in scanline order: square tiles, and
+// in them squares of 4 x 4, so that a packet of 16 is such a square and one of 8 is half of it.
 #pragma once
 
 #include <array>
