@@ -6,6 +6,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cstring>
 #include <limits>
 #include <string>
@@ -86,10 +87,9 @@ TEST_CASE("a ray file is laid out as NumPy writes it") {
     CHECK(file.substr(0, 10) == std::string("\x93NUMPY\x01\x00\x76\x00", 10));
     const std::string dictionary = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 8), }";
     CHECK(file.substr(10, 118) == dictionary + std::string(117 - dictionary.size(), ' ') + "\n");
-    float second_ray[8];
-    std::memcpy(second_ray, file.data() + 128 + 32, sizeof(second_ray));
-    const float expected[8] = {1.0f, 1.25f, -1.0f, 0.5f, 1.0f, 1.0f, 1e-30f, 3.0f};
-    CHECK(std::memcmp(second_ray, expected, sizeof(expected)) == 0);
+    std::array<float, 8> second_ray{};
+    std::memcpy(second_ray.data(), file.data() + 128 + 32, 32);
+    CHECK(second_ray == std::array{1.0f, 1.25f, -1.0f, 0.5f, 1.0f, 1.0f, 1e-30f, 3.0f});
 }
 
 TEST_CASE("a hit file holds records of six named fields") {
@@ -165,16 +165,16 @@ TEST_CASE("malformed headers are refused") {
     check_error("", "truncated");
     check_error(std::string(256, 'x'), "not an NPY file");
     check_error(npy(9, rays_dictionary("(1, 8)"), data), "version 9.0");
-    const std::string order = "'fortran_order': False", shape = "'shape': (1, 8)";
-    for (const std::string& dictionary :
-         {std::string(), std::string("{"), std::string("{}"), "{'descr': '<f4', " + order + "}",
-          "{'descr': '<f4, " + order + "}", "{'descr' '<f4', " + order + "}",
-          "{'descr': '<f4', " + order + ", " + shape + "} x",
-          "{'descr': '<f4', " + order + ", " + shape + ", " + shape + "}",
-          "{'descr': '<f4', " + order + ", " + shape + ", 'x': 1}",
-          "{'descr': '<f4', " + order + ", 'shape': (1 8)}",
-          "{'descr': '<f4', 'fortran_order': 0, " + shape + "}"}) {
-        CAPTURE(dictionary);
+    for (const char* dictionary :
+         {"", "{", "{}", "{'descr': '<f4', 'fortran_order': False}",
+          "{'descr': '<f4, 'fortran_order': False, 'shape': (1, 8)}",
+          "{'descr' '<f4', 'fortran_order': False, 'shape': (1, 8)}",
+          "{'descr': '<f4', 'fortran_order': 0, 'shape': (1, 8)}",
+          "{'descr': '<f4', 'fortran_order': False, 'shape': (1 8)}",
+          "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 8), 'x': 1}",
+          "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 8), 'shape': (1, 8)}",
+          "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 8)} x"}) {
+        CAPTURE(std::string(dictionary));
         check_error(npy(1, dictionary, data), "bad NPY header");
     }
 }

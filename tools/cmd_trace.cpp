@@ -96,7 +96,7 @@ TraceReport describe(const Scene& scene, const TraceCommand& command) {
     report.mode = common.trace.mode;
     report.isa = common.trace.isa ? *common.trace.isa : default_isa();
     const int all = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
-    report.threads = common.trace.threads == 0 ? all : common.trace.threads;
+    report.threads = common.trace.threads == 0 ? all : std::min(common.trace.threads, all);
     report.query = command.query.name;
     report.build = scene.build_stats();
     report.repeats = command.repeats;

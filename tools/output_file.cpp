@@ -47,6 +47,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::write(std::span<const std::byte> bytes) {
+    if (bytes.empty()) return;  // fwrite takes no null pointer, not even to nothing
     if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) {
         fail(target_, errno);
     }

@@ -17,7 +17,7 @@ namespace packet {
 
 /// How rays walk the structure. All modes return the same hits.
 enum class Mode : std::uint8_t {
-    kAuto,     ///< looks at the rays and picks
+    kAuto,     ///< looks at the rays, or tries some of them, and picks
     kSingle,   ///< one ray at a time
     kPacket8,  ///< 8 rays share one stack
     kPacket16  ///< 16 rays share one stack
@@ -35,10 +35,10 @@ struct ModeName {
 /// Work counted while tracing.
 struct TraceStats {
     std::uint64_t rays = 0;
-    std::uint64_t nodes = 0;         ///< boxes of nodes met by a lane, summed over lanes
-    std::uint64_t triangles = 0;     ///< triangles met by a lane, summed over lanes
-    std::uint64_t lanes_active = 0;  ///< lanes that took part in box tests
-    std::uint64_t lanes_issued = 0;  ///< lanes that were paid for in box tests
+    std::uint64_t nodes = 0;         ///< inner nodes visited, summed over lanes
+    std::uint64_t triangles = 0;     ///< triangles met, summed over lanes
+    std::uint64_t lanes_active = 0;  ///< lanes that took part in visits of nodes
+    std::uint64_t lanes_issued = 0;  ///< lanes that were paid for in them
 
     TraceStats& operator+=(const TraceStats& other) noexcept;
     [[nodiscard]] double nodes_per_ray() const noexcept;

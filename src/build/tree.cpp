@@ -1,5 +1,7 @@
 #include "build/tree.h"
 
+#include "build/collapse.h"
+
 #include <packet/error.h>
 
 #include <algorithm>
@@ -9,83 +11,71 @@ namespace packet {
 
 namespace {
 
-/// Depth-first placement of a hierarchy's nodes, and of the items of its leaves by a policy.
-class Linearizer {
-public:
-    Linearizer(const Hierarchy& hierarchy, const BuildOptions& options, std::uint32_t block_size)
-        : hierarchy_(hierarchy), options_(options), block_size_(block_size) {}
+Node make_node(const BuildNode& source) {
+    Node node = {};
+    for (int a = 0; a < 3; ++a) {
+        node.plane[0][a] = source.bounds.lower[a];
+        node.plane[1][a] = source.bounds.upper[a];
+    }
+    node.link = source.first;  // a leaf's first reference, until its items are placed
+    node.count = source.count;
+    return node;
+}
 
-    /// A leaf's references and the first item they become.
-    struct LeafItems {
-        std::uint32_t first_reference, count, first_item;
+/// Adds a node to the statistics: its cost counts as often as a random ray that meets the root's box
+/// meets its own.
+void count_node(const BuildNode& node, int depth, double root_area, const BuildOptions& options,
+                BuildStats& stats) {
+    const double share = static_cast<double>(node.bounds.half_area()) / root_area;
+    stats.depth = std::max(stats.depth, depth);
+    ++stats.node_count;
+    stats.leaf_count += node.is_leaf();
+    stats.sah_cost += share * (node.is_leaf() ? static_cast<double>(options.intersection_cost) *
+                                                    static_cast<double>(node.count)
+                                              : static_cast<double>(options.traversal_cost));
+}
+
+/// The binary nodes, depth first. Iterative: small stacks of threads are not ours to fill.
+void linearize(const Hierarchy& hierarchy, const BuildOptions& options, Tree& tree) {
+    struct Pending {
+        std::uint32_t source, parent;
+        int depth;
     };
-
-    void run(Tree& tree) {
-        if (hierarchy_.references.empty()) return;
-        tree.bounds = hierarchy_.nodes[0].bounds;
-        root_area_ = std::max(static_cast<double>(tree.bounds.half_area()),
-                              std::numeric_limits<double>::min());
-        // Iterative: the depth is bounded, but small stacks of threads are not ours to fill.
-        struct Pending {
-            std::uint32_t source, parent;
-            int depth;
-        };
-        constexpr std::uint32_t kNoParent = 0xFFFFFFFF;
-        std::vector<Pending> stack = {{0, kNoParent, 0}};
-        while (!stack.empty()) {
-            const Pending p = stack.back();
-            stack.pop_back();
-            const BuildNode& source = hierarchy_.nodes[p.source];
-            const auto index = static_cast<std::uint32_t>(tree.nodes.size());
-            if (p.parent != kNoParent) tree.nodes[p.parent].link = index;
-            tree.nodes.push_back(make_node(source, p.depth, tree.stats));
-            if (source.is_leaf()) continue;
-            stack.push_back({source.second, index, p.depth + 1});
-            stack.push_back({source.first, kNoParent, p.depth + 1});
-        }
-        tree.nodes.shrink_to_fit();
-        tree.stats.node_count = tree.nodes.size();
+    constexpr std::uint32_t kNoParent = 0xFFFFFFFF;
+    const double root_area = std::max(static_cast<double>(tree.bounds.half_area()),
+                                      std::numeric_limits<double>::min());
+    std::vector<Pending> stack = {{0, kNoParent, 0}};
+    while (!stack.empty()) {
+        const Pending p = stack.back();
+        stack.pop_back();
+        const BuildNode& source = hierarchy.nodes[p.source];
+        const auto index = static_cast<std::uint32_t>(tree.nodes.size());
+        if (p.parent != kNoParent) tree.nodes[p.parent].link = index;
+        tree.nodes.push_back(make_node(source));
+        count_node(source, p.depth, root_area, options, tree.stats);
+        if (source.is_leaf()) continue;
+        stack.push_back({source.second, index, p.depth + 1});
+        stack.push_back({source.first, kNoParent, p.depth + 1});
     }
+    tree.nodes.shrink_to_fit();
+}
 
-    [[nodiscard]] const std::vector<LeafItems>& leaves() const { return leaves_; }
-    [[nodiscard]] std::uint32_t item_count() const { return item_count_; }
+/// Both forms of the tree, and where the references become items.
+Collapsed make_nodes(const Hierarchy& hierarchy, const BuildOptions& options,
+                     std::uint32_t block_size, Tree& tree) {
+    if (hierarchy.references.empty()) return {};
+    tree.bounds = hierarchy.nodes[0].bounds;
+    linearize(hierarchy, options, tree);
+    Collapsed collapsed = collapse(tree.nodes, block_size);
+    tree.wide_nodes = std::move(collapsed.nodes);
+    tree.wide_nodes.shrink_to_fit();
+    return collapsed;
+}
 
-private:
-    Node make_node(const BuildNode& source, int depth, BuildStats& stats) {
-        const double share = static_cast<double>(source.bounds.half_area()) / root_area_;
-        Node node = {};
-        for (int a = 0; a < 3; ++a) {
-            node.plane[0][a] = source.bounds.lower[a];
-            node.plane[1][a] = source.bounds.upper[a];
-        }
-        node.count = source.count;
-        stats.depth = std::max(stats.depth, depth);
-        if (source.is_leaf()) {
-            node.link = place_leaf(source);
-            ++stats.leaf_count;
-            stats.sah_cost += share * static_cast<double>(options_.intersection_cost) *
-                              static_cast<double>(source.count);
-        } else {
-            stats.sah_cost += share * static_cast<double>(options_.traversal_cost);
-        }
-        return node;
-    }
-
-    std::uint32_t place_leaf(const BuildNode& leaf) {
-        const std::uint32_t used = item_count_ % block_size_;
-        if (used != 0 && used + leaf.count > block_size_) item_count_ += block_size_ - used;
-        leaves_.push_back({leaf.first, leaf.count, item_count_});
-        item_count_ += leaf.count;
-        return leaves_.back().first_item;
-    }
-
-    const Hierarchy& hierarchy_;
-    const BuildOptions& options_;
-    std::uint32_t block_size_;
-    double root_area_ = 1.0;
-    std::uint32_t item_count_ = 0;
-    std::vector<LeafItems> leaves_;
-};
+std::size_t byte_count(const Tree& tree) {
+    return tree.nodes.size() * sizeof(Node) + tree.wide_nodes.size() * sizeof(WideNode) +
+           tree.blocks.size() * sizeof(TriangleBlock);
+}
 
 /// A block that nothing hits.
 TriangleBlock empty_block() {
@@ -108,6 +98,7 @@ void store_triangle(TriangleBlock& block, std::uint32_t lane, MeshView mesh, std
 TreeView Tree::view() const noexcept {
     TreeView out;
     out.nodes = nodes.data();
+    out.wide_nodes = wide_nodes.data();
     out.blocks = blocks.data();
     out.node_count = static_cast<std::uint32_t>(nodes.size());
     for (int a = 0; a < 3 && !nodes.empty(); ++a) {
@@ -121,30 +112,28 @@ Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& op
                const Parallel& parallel) {
     constexpr std::size_t kGrain = 4096;
     Tree tree;
-    Linearizer linearizer(hierarchy, options, kBlockSize);
-    linearizer.run(tree);
-    tree.blocks.assign((linearizer.item_count() + kBlockSize - 1) / kBlockSize, empty_block());
-    const auto& leaves = linearizer.leaves();
+    const Collapsed collapsed = make_nodes(hierarchy, options, kBlockSize, tree);
+    tree.blocks.assign((collapsed.item_count + kBlockSize - 1) / kBlockSize, empty_block());
+    const auto& places = collapsed.places;
     parallel.run([&] {
-        parallel.for_pieces(leaves.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel.for_pieces(places.size(), kGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t l = begin; l < end; ++l) {
-                for (std::uint32_t i = 0; i < leaves[l].count; ++i) {
-                    const std::uint32_t item = leaves[l].first_item + i;
+                for (std::uint32_t i = 0; i < places[l].count; ++i) {
+                    const std::uint32_t item = places[l].first_item + i;
                     store_triangle(tree.blocks[item / kBlockSize], item % kBlockSize, mesh,
-                                   hierarchy.references[leaves[l].first_reference + i].id);
+                                   hierarchy.references[places[l].first_reference + i].id);
                 }
             }
         });
     });
-    tree.stats.bytes =
-        tree.nodes.size() * sizeof(Node) + tree.blocks.size() * sizeof(TriangleBlock);
+    tree.stats.bytes = byte_count(tree);
     return tree;
 }
 
 Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options) {
     Tree tree;
-    Linearizer(hierarchy, options, 1).run(tree);
-    tree.stats.bytes = tree.nodes.size() * sizeof(Node);
+    (void)make_nodes(hierarchy, options, 1, tree);  // items are the references in their order
+    tree.stats.bytes = byte_count(tree);
     return tree;
 }
 

@@ -12,6 +12,7 @@ namespace packet {
 /// Owns what a TreeView shows.
 struct Tree {
     AlignedVector<Node> nodes;
+    AlignedVector<WideNode> wide_nodes;
     AlignedVector<TriangleBlock> blocks;
     Bounds3f bounds;
     BuildStats stats;
@@ -24,7 +25,7 @@ struct Tree {
 [[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
                              const Parallel& parallel);
 
-/// Lays out only nodes; items of the leaves are the hierarchy's references.
+/// Lays out only nodes, in both forms; items of the leaves are the hierarchy's references.
 [[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options);
 
 /// Builds the structure that `options.accel` names. Triangles that can never be hit are left out

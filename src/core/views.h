@@ -28,6 +28,18 @@ struct Node {
 };
 static_assert(sizeof(Node) == 32 && std::is_trivially_copyable_v<Node>);
 
+/// Children of a wide node.
+inline constexpr int kWideSize = 8;
+
+/// A node of the 8-wide form of a tree. Its children's boxes are a structure of arrays. Children that
+/// are not there have a box that nothing meets: lower +inf, upper -inf.
+struct alignas(64) WideNode {
+    float plane[2][3][kWideSize];    ///< [lower, upper][axis][child]
+    std::uint32_t link[kWideSize];   ///< inner: index of the child's node; leaf: its first item
+    std::uint32_t count[kWideSize];  ///< inner: 0; leaf: how many items
+};
+static_assert(sizeof(WideNode) == 256 && std::is_trivially_copyable_v<WideNode>);
+
 /// Eight triangles as a structure of arrays. Lanes without one hold NaN, which nothing hits.
 struct alignas(32) TriangleBlock {
     float v[3][3][kBlockSize];  ///< [corner][axis][lane]
@@ -38,6 +50,7 @@ static_assert(sizeof(TriangleBlock) == 320 && std::is_trivially_copyable_v<Trian
 /// A tree. Items of leaves are triangles (item i is lane i % 8 of block i / 8) or instances.
 struct TreeView {
     const Node* nodes = nullptr;
+    const WideNode* wide_nodes = nullptr;
     const TriangleBlock* blocks = nullptr;
     std::uint32_t node_count = 0;  ///< 0: nothing to hit
     float lower[3] = {0, 0, 0};    ///< the box of all items

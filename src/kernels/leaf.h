@@ -24,26 +24,6 @@ PACKET_INLINE void meet_triangles(const TreeView& tree, const PreparedRays<N, Is
     }
 }
 
-/// One ray in all lanes, from the prepared single ray.
-template <int N, class Isa>
-PACKET_INLINE PreparedRays<N, Isa> broadcast(const PreparedRays<1, Isa>& ray) {
-    PreparedRays<N, Isa> out;
-    for (int a = 0; a < 3; ++a) {
-        out.org_plus[a] = ray.org_plus[a].r[0];
-        out.org_minus[a] = ray.org_minus[a].r[0];
-        out.inv_dir[a] = ray.inv_dir[a].r[0];
-        out.org[a] = ray.org[a].r[0];
-        out.axis[a] = ray.axis[a];
-        out.near_side[a] = ray.near_side[a];
-    }
-    out.tnear = ray.tnear.r[0];
-    out.shear_x = ray.shear_x.r[0];
-    out.shear_y = ray.shear_y.r[0];
-    out.scale_z = ray.scale_z.r[0];
-    out.directions = Directions::kShared;
-    return out;
-}
-
 /// The lane with the smallest (t, prim_id) among `bits`.
 template <int N>
 PACKET_INLINE int nearest_lane(std::uint32_t bits, const float (&t)[N],
@@ -56,26 +36,26 @@ PACKET_INLINE int nearest_lane(std::uint32_t bits, const float (&t)[N],
     return nearest;
 }
 
-/// A single ray meets the blocks that hold triangles `first` to `first + count`. Neighbours of
-/// other leaves in the same block are met along: they are triangles like any other.
-template <Query query, Directions, class Isa>
-PACKET_INLINE void meet_triangles(const TreeView& tree, const PreparedRays<1, Isa>& ray,
-                                  std::uint32_t first, std::uint32_t count,
-                                  std::int32_t instance_id, BestHits<1, Isa>& best) {
+/// A single ray, in all lanes, meets the blocks that hold triangles `first` to `first + count`. Other
+/// leaves' triangles in the same block are met along: they are triangles like any other.
+template <Query query, class Isa>
+PACKET_INLINE void meet_blocks(const TreeView& tree, const PreparedRays<kBlockSize, Isa>& ray,
+                               std::uint32_t first, std::uint32_t count, std::int32_t instance_id,
+                               BestHits<1, Isa>& best) {
     using F = Float<kBlockSize, Isa>;
-    const PreparedRays<kBlockSize, Isa> wide = broadcast<kBlockSize>(ray);
     for (std::uint32_t b = first / kBlockSize; b <= (first + count - 1) / kBlockSize; ++b) {
         const TriangleBlock& block = tree.blocks[b];
         const TriangleHits<kBlockSize, Isa> hits = test_triangles<Directions::kShared>(
-            wide, F(best.t.r[0]),
+            ray, F(best.t.r[0]),
             [&](int corner, int axis) { return F::load(block.v[corner][axis]); });
         const std::uint32_t bits = hits.hit.bits();
         if (bits == 0) continue;
         float t[kBlockSize], u[kBlockSize], v[kBlockSize];
         hits.t.store(t), hits.u.store(u), hits.v.store(v);
         const int i = nearest_lane(bits, t, block.prim_id);
-        best.template update<query>(Mask<1, Isa>::from_bits(1), t[i], u[i], v[i], block.prim_id[i],
-                                    instance_id);
+        best.template update<query>(Mask<1, Isa>::from_bits(1), t[i], u[i], v[i],
+                                    block.prim_id[i], instance_id);
+        if (query == Query::kAny) return;
     }
 }
 

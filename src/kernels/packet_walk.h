@@ -1,6 +1,6 @@
 // Walks a binary tree with a packet of rays that share one stack. A node is visited while any lane
 // is active; the child that most lanes enter first comes first; what lies behind a lane's best hit
-// is culled when it is pushed and again when it is popped. A packet of one is the single-ray walk.
+// is culled when it is pushed and again when it is popped.
 //
 // Wald, Slusallek, Benthin, Wagner. Interactive rendering with coherent ray tracing. Eurographics
 // 2001. Wald, Boulos, Shirley. Ray tracing deformable scenes using dynamic bounding volume
@@ -37,13 +37,12 @@ PACKET_INLINE void walk_tree(const TreeView& tree, const PreparedRays<N, Isa>& r
     int depth = 0;
     std::uint32_t node_id = 0;
     F enter = entry<directions>(ray, tree.nodes[0], best_t);
-    stats.boxes(best_t > F(kNever), N, 1);
     for (;;) {
         // enter <= best_t also drops the lanes that missed: best_t is finite
         if (any(enter <= best_t)) {
             const Node& node = tree.nodes[node_id];
             if (!node.is_leaf()) {
-                stats.boxes(enter <= best_t, N, 2);
+                stats.visit(count(enter <= best_t), N);
                 const F enter0 = entry<directions>(ray, tree.nodes[node_id + 1], best_t);
                 const F enter1 = entry<directions>(ray, tree.nodes[node.link], best_t);
                 // The lane with +inf in both has no vote, since +inf < +inf is false either way.

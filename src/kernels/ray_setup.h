@@ -136,4 +136,27 @@ PACKET_INLINE void prepare_triangles(PreparedRays<N, Isa>& out, const RayLanes<N
     }
 }
 
+/// All of it, for rays whose `active` lanes are usable.
+template <int N, class Isa>
+PACKET_INLINE PreparedRays<N, Isa> prepare(const TreeView& tree, const RayLanes<N, Isa>& ray,
+                                           std::uint32_t active) {
+    PreparedRays<N, Isa> out;
+    prepare_boxes(out, tree, ray);
+    prepare_triangles(out, ray, active);
+    return out;
+}
+
+/// One ray in all lanes.
+template <int N, class Isa>
+PACKET_INLINE RayLanes<N, Isa> broadcast(const RayLanes<1, Isa>& ray) {
+    RayLanes<N, Isa> out;
+    for (int a = 0; a < 3; ++a) {
+        out.org[a] = ray.org[a].r[0];
+        out.dir[a] = ray.dir[a].r[0];
+    }
+    out.tnear = ray.tnear.r[0];
+    out.tfar = ray.tfar.r[0];
+    return out;
+}
+
 }  // namespace packet

@@ -5,6 +5,7 @@
 
 #include "kernels/leaf.h"
 #include "kernels/packet_walk.h"
+#include "kernels/single_walk.h"
 
 namespace packet {
 
@@ -20,8 +21,7 @@ PACKET_INLINE void walk_mesh_directed(const TreeView& tree, const PreparedRays<N
                           });
 }
 
-/// The lanes of `ray` that are usable in the mesh's space and still look for something meet the
-/// mesh.
+/// The lanes of `ray` that are usable in the mesh's space and still look for something meet the mesh.
 template <Query query, int N, class Isa, class Stats>
 [[gnu::noinline]] void walk_mesh(const TreeView& tree, const RayLanes<N, Isa>& ray,
                                  std::int32_t instance_id, BestHits<N, Isa>& best, Stats& stats) {
@@ -30,19 +30,27 @@ template <Query query, int N, class Isa, class Stats>
     const Mask<N, Isa> looking = best.t > F(kNever);
     const Mask<N, Isa> active = looking & usable(ray);
     if (none(active)) return;
-    PreparedRays<N, Isa> prepared;
-    prepare_boxes(prepared, tree, ray);
-    prepare_triangles(prepared, ray, active.bits());
     best.enter_instance(instance_id);
-
-    const F kept = best.t;
-    best.t = select(active, best.t, F(kNever));
-    if (prepared.directions == Directions::kShared) {
-        walk_mesh_directed<query, Directions::kShared>(tree, prepared, instance_id, best, stats);
-    } else if constexpr (N > 1) {
-        walk_mesh_directed<query, Directions::kMixed>(tree, prepared, instance_id, best, stats);
+    if constexpr (N == 1) {
+        const PreparedRays<kWideSize, Isa> prepared = prepare(tree, broadcast<kWideSize>(ray), 0xFF);
+        walk_wide_tree<query>(tree, prepared, best.t.r[0], stats,
+                              [&](std::uint32_t first, std::uint32_t item_count) {
+                                  stats.triangles(static_cast<int>(item_count));
+                                  meet_blocks<query>(tree, prepared, first, item_count,
+                                                     instance_id, best);
+                              });
+    } else {
+        const PreparedRays<N, Isa> prepared = prepare(tree, ray, active.bits());
+        const F kept = best.t;
+        best.t = select(active, best.t, F(kNever));
+        if (prepared.directions == Directions::kShared) {
+            walk_mesh_directed<query, Directions::kShared>(tree, prepared, instance_id, best,
+                                                           stats);
+        } else {
+            walk_mesh_directed<query, Directions::kMixed>(tree, prepared, instance_id, best, stats);
+        }
+        best.t = select(active, best.t, kept);
     }
-    best.t = select(active, best.t, kept);
 }
 
 /// object = M * world, rounded in this order on every ISA.
@@ -62,6 +70,21 @@ PACKET_INLINE RayLanes<N, Isa> to_object(const InstanceView& instance,
     return out;
 }
 
+/// The lanes of `active` meet the instances of a leaf of the top tree; the others sit out.
+template <Query query, int N, class Isa, class Stats>
+PACKET_INLINE void meet_instances(const SceneView& scene, const RayLanes<N, Isa>& ray,
+                                  std::uint32_t first, std::uint32_t item_count,
+                                  Mask<N, Isa> active, BestHits<N, Isa>& best, Stats& stats) {
+    const Float<N, Isa> kept = best.t;
+    best.t = select(active, best.t, Float<N, Isa>(kNever));
+    for (std::uint32_t i = first; i < first + item_count; ++i) {
+        const InstanceView& instance = scene.instances[i];
+        walk_mesh<query>(instance.tree, to_object(instance, ray),
+                         static_cast<std::int32_t>(instance.instance_id), best, stats);
+    }
+    best.t = select(active, best.t, kept);
+}
+
 template <Query query, int N, class Isa, class Stats>
 PACKET_INLINE void walk_scene(const SceneView& scene, const RayLanes<N, Isa>& ray,
                               BestHits<N, Isa>& best, Stats& stats) {
@@ -71,21 +94,22 @@ PACKET_INLINE void walk_scene(const SceneView& scene, const RayLanes<N, Isa>& ra
         return;
     }
     if (scene.top.node_count == 0) return;
-    PreparedRays<N, Isa> prepared;
-    prepare_boxes(prepared, scene.top, ray);
-    walk_tree<Directions::kMixed>(
-        scene.top, prepared, best.t, stats,
-        [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
-            // Lanes that miss the instance's box sit out, as they would in a tree.
-            const Float<N, Isa> kept = best.t;
-            best.t = select(active, best.t, Float<N, Isa>(kNever));
-            for (std::uint32_t i = first; i < first + item_count; ++i) {
-                const InstanceView& instance = scene.instances[i];
-                walk_mesh<query>(instance.tree, to_object(instance, ray),
-                                 static_cast<std::int32_t>(instance.instance_id), best, stats);
-            }
-            best.t = select(active, best.t, kept);
-        });
+    if constexpr (N == 1) {
+        const auto prepared = prepare(scene.top, broadcast<kWideSize>(ray), 0xFF);
+        walk_wide_tree<query>(scene.top, prepared, best.t.r[0], stats,
+                              [&](std::uint32_t first, std::uint32_t item_count) {
+                                  meet_instances<query>(scene, ray, first, item_count,
+                                                        Mask<1, Isa>::from_bits(1), best, stats);
+                              });
+    } else {
+        PreparedRays<N, Isa> prepared;
+        prepare_boxes(prepared, scene.top, ray);
+        walk_tree<Directions::kMixed>(
+            scene.top, prepared, best.t, stats,
+            [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
+                meet_instances<query>(scene, ray, first, item_count, active, best, stats);
+            });
+    }
 }
 
 }  // namespace packet

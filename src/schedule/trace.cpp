@@ -9,7 +9,9 @@
 #include <packet/error.h>
 #include <packet/trace.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <mutex>
 
 namespace packet {
@@ -24,7 +26,11 @@ constexpr std::array kModeNames = {
 };
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
-constexpr std::size_t kRaysPerTask = 1024;
+constexpr std::size_t kRaysPerTask = 512;
+// Where auto cannot tell by the rays' looks, it tries both ways on this many pairs of tasks,
+constexpr std::size_t kTrialPairs = 3;
+// if that is so little of the whole that the slower tries do not count.
+constexpr std::size_t kLeastTasksForTrial = 64;
 
 KernelTable::Width width_of(Mode mode) {
     switch (mode) {
@@ -36,81 +42,107 @@ KernelTable::Width width_of(Mode mode) {
     return KernelTable::kWidth1;
 }
 
+/// Rays cut into tasks: an image's into square tiles, others into runs.
+class Tasks {
+public:
+    Tasks(std::span<const Ray> rays, int width) : rays_(rays), image_(rays.size(), width) {}
+
+    [[nodiscard]] std::size_t count() const {
+        return image_.is_image() ? image_.tile_count()
+                                 : (rays_.size() + kRaysPerTask - 1) / kRaysPerTask;
+    }
+    /// Runs a kernel on the rays of a task. `batch` says where results go, for all rays.
+    void run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
+        PixelOrder::Indices order;
+        std::size_t first = task * kRaysPerTask;
+        batch.count = std::min(kRaysPerTask, rays_.size() - std::min(first, rays_.size()));
+        if (image_.is_image()) {
+            first = image_.first_ray(task);
+            batch.count = image_.fill(task, order);
+            batch.order = order.data();
+        }
+        batch.rays = rays_.data() + first;
+        if (batch.hits != nullptr) batch.hits += first;
+        if (batch.occluded != nullptr) batch.occluded += first;
+        if (batch.stats != nullptr) batch.stats->rays += batch.count;
+        kernel(batch);
+    }
+
+private:
+    std::span<const Ray> rays_;
+    PixelOrder image_;
+};
+
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
 public:
+    using Kernels = KernelTable::Batch[KernelTable::kWidthCount][KernelTable::kCountingCount];
+
     SpanTrace(const Scene& scene, std::span<const Ray> rays, const TraceOptions& options)
-        : scene_(scene.accel()), rays_(rays), options_(options), parallel_(options.threads) {
+        : scene_(scene.accel()), tasks_(rays, options.width), options_(options),
+          parallel_(options.threads) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
                                                   "; it must be 0 (no image) or more");
         }
-        Mode mode = options.mode;
-        if (mode == Mode::kAuto) mode = choose_mode(rays, scene_.top.bounds);
+        const bool is_auto = options.mode == Mode::kAuto;
+        const Mode mode = is_auto ? choose_mode(rays, scene_.top.bounds) : options.mode;
         width_ = width_of(mode);
-        kernels_ = &select_kernels(options.isa);
+        tries_ = is_auto && mode == Mode::kSingle && tasks_.count() >= kLeastTasksForTrial;
     }
 
-    void closest(Hit* hits) const { trace(kernels_->closest[width_][counting()], hits, nullptr); }
-    void any(std::uint8_t* occluded) const {
-        trace(kernels_->any[width_][counting()], nullptr, occluded);
-    }
-
-private:
-    [[nodiscard]] KernelTable::Counting counting() const {
-        return options_.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
-    }
-
-    void trace(KernelTable::Batch kernel, Hit* hits, std::uint8_t* occluded) const {
-        const auto rays_from = [&](std::size_t begin) {
-            return TraceBatch{&scene_.view,
-                              rays_.data() + begin,
-                              nullptr,
-                              0,
-                              hits != nullptr ? hits + begin : nullptr,
-                              occluded != nullptr ? occluded + begin : nullptr,
-                              nullptr};
-        };
-        const PixelOrder image(rays_.size(), options_.width);
+    void run(const Kernels& kernels, Hit* hits, std::uint8_t* occluded) const {
+        const TraceBatch batch{&scene_.view, nullptr, nullptr, 0, hits, occluded, nullptr};
+        const auto counting =
+            options_.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
+        const auto kernel = [&](KernelTable::Width width) { return kernels[width][counting]; };
         parallel_.run([&] {
-            if (width_ == KernelTable::kWidth1 || !image.is_image()) {
-                parallel_.for_pieces(rays_.size(), kRaysPerTask,
-                                     [&](std::size_t begin, std::size_t end) {
-                                         TraceBatch batch = rays_from(begin);
-                                         batch.count = end - begin;
-                                         run_kernel(kernel, batch);
-                                     });
-            } else {
-                parallel_.for_pieces(image.tile_count(), 1, [&](std::size_t tile, std::size_t) {
-                    PixelOrder::Indices order;
-                    TraceBatch batch = rays_from(image.first_ray(tile));
-                    batch.count = image.fill(tile, order);
-                    batch.order = order.data();
-                    run_kernel(kernel, batch);
-                });
-            }
+            const KernelTable::Width width =
+                tries_ ? try_both(kernel(width_), kernel(KernelTable::kWidth16), batch) : width_;
+            parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
+                if (!is_trial(task)) run_task(task, kernel(width), batch);
+            });
         });
     }
 
-    void run_kernel(KernelTable::Batch kernel, TraceBatch& batch) const {
+private:
+    /// Pairs of neighbouring tasks, spread over all: one is tried as single rays, one as packets.
+    [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrialPairs; }
+    [[nodiscard]] bool is_trial(std::size_t task) const {
+        return tries_ && task % trial_stride() < 2 && task / trial_stride() < kTrialPairs;
+    }
+
+    /// Traces the trial tasks and returns what took less time. Their hits are as good as any.
+    [[nodiscard]] KernelTable::Width try_both(KernelTable::Batch single, KernelTable::Batch packets,
+                                              const TraceBatch& batch) const {
+        using Clock = std::chrono::steady_clock;
+        Clock::duration taken[2] = {};
+        for (std::size_t i = 0; i < 2 * kTrialPairs; ++i) {
+            const Clock::time_point start = Clock::now();
+            run_task(i / 2 * trial_stride() + i % 2, i % 2 == 0 ? single : packets, batch);
+            taken[i % 2] += Clock::now() - start;
+        }
+        return taken[0] <= taken[1] ? KernelTable::kWidth1 : KernelTable::kWidth16;
+    }
+
+    void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
         if (options_.stats == nullptr) {
-            kernel(batch);
+            tasks_.run(task, kernel, batch);
             return;
         }
         TraceStats stats;
-        stats.rays = batch.count;
         batch.stats = &stats;
-        kernel(batch);
+        tasks_.run(task, kernel, batch);
         const std::lock_guard lock(stats_mutex_);
         *options_.stats += stats;
     }
 
     const SceneAccel& scene_;
-    std::span<const Ray> rays_;
+    Tasks tasks_;
     const TraceOptions& options_;
     Parallel parallel_;
     KernelTable::Width width_;
-    const KernelTable* kernels_;
+    bool tries_;  ///< whether to find the mode by trying
     mutable std::mutex stats_mutex_;
 };
 
@@ -152,13 +184,15 @@ double TraceStats::lane_utilization() const noexcept { return ratio(lanes_active
 void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                    const TraceOptions& options) {
     check_sizes(rays.size(), hits.size(), "hits");
-    SpanTrace(scene, rays, options).closest(hits.data());
+    const SpanTrace trace(scene, rays, options);
+    trace.run(select_kernels(options.isa).closest, hits.data(), nullptr);
 }
 
 void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size(), "results");
-    SpanTrace(scene, rays, options).any(occluded.data());
+    const SpanTrace trace(scene, rays, options);
+    trace.run(select_kernels(options.isa).any, nullptr, occluded.data());
 }
 
 Hit trace_closest(const Scene& scene, const Ray& ray) {
