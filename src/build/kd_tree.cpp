@@ -121,7 +121,10 @@ private:
             const bool is_small = count <= static_cast<std::size_t>(options_.max_leaf_size);
             if (!plane.is_cut() && is_small) return {};
             KdChildren children = plane.is_cut() ? cut_cell(mesh_, cell, plane) : halve_cell(cell);
-            if (!fits_depth(children)) children = halve_cell(cell);
+            if (!fits_depth(children)) {
+                if (is_small) return {};
+                children = halve_cell(cell);
+            }
             if (rule_ == KdRule::kSah) split_events(cell.events, children, parallel_);
             auto& [cell0, cell1] = children.cell;
             if (!cell0.references.empty() && !cell1.references.empty()) return children;
@@ -167,7 +170,10 @@ private:
         for (const Reference& r : cell.references) centroids.push_back(r.bounds().center()[axis]);
         const auto half = centroids.begin() + static_cast<std::ptrdiff_t>(centroids.size() / 2);
         std::nth_element(centroids.begin(), half, centroids.end());
-        return *half;
+        // Between the two in the middle, so that a plane at a median cuts no more than it must.
+        const float below =
+            half == centroids.begin() ? *half : *std::max_element(centroids.begin(), half);
+        return 0.5f * below + 0.5f * *half;
     }
 
     KdRule rule_;
