@@ -4,6 +4,7 @@
 #include "test_rays.h"
 
 #include "build/clip.h"
+#include "build/kd_events.h"
 #include "build/kd_tree.h"
 #include "build/tree.h"
 
@@ -67,6 +68,44 @@ std::size_t reference_count(const Tree& tree) {
     return count;
 }
 
+/// Boxes on a coarse lattice, so that many begin, end or are flat in one plane; some leave gaps.
+KdCell random_cell(tools::Random& random, const Parallel& parallel) {
+    KdCell cell;
+    const std::uint64_t count = 2 + random.next() % 30;
+    for (std::uint32_t id = 0; id < count; ++id) {
+        const glm::vec3 lower = glm::floor(12.0f * random.point());
+        const glm::vec3 upper = lower + glm::floor(2.5f * random.point());
+        cell.references.push_back({lower, id, upper});
+        cell.bounds.extend({lower, upper});
+    }
+    cell.events = make_events(cell.references, parallel);
+    cell.spare = random.next() % 20;
+    return cell;
+}
+
+/// The least cost over all planes, each from a look at every reference.
+double cheapest_cost(const KdCell& cell, const BuildOptions& options) {
+    const KdCost cost(cell, options);
+    double best = cost.leaf();
+    for (int i = 0; i < 12 * static_cast<int>(cell.references.size()); ++i) {
+        const Reference& at = cell.references[static_cast<std::size_t>(i / 12)];
+        const int axis = i % 3;
+        const float position = i / 6 % 2 == 0 ? at.lower[axis] : at.upper[axis];
+        const KdPlane plane{0.0, position, axis, i / 3 % 2};
+        KdCounts counts;
+        float end = -INFINITY, begin = INFINITY;
+        for (const Reference& r : cell.references) {
+            const int side = plane.side_of(r);
+            if (side != 1) ++counts.side[0], end = std::max(end, r.upper[axis]);
+            if (side != 0) ++counts.side[1], begin = std::min(begin, r.lower[axis]);
+        }
+        if (!counts.allow_cut(cell)) continue;
+        end = std::min(end, plane.position), begin = std::max(begin, plane.position);
+        best = std::min(best, cost.cut(axis, end, begin, counts));
+    }
+    return best;
+}
+
 constexpr AccelKind kKdTrees[] = {AccelKind::kKdMidpoint, AccelKind::kKdMedian, AccelKind::kKdSah};
 
 }  // namespace
@@ -125,6 +164,43 @@ TEST_CASE("both parts of a cut triangle meet at the plane and lose none of it") 
         Bounds3f both = cut.side[0].bounds();
         both.extend(cut.side[1].bounds());
         CHECK(both == box);
+        const Corners v = {mesh.positions[0], mesh.positions[1], mesh.positions[2]};
+        Bounds3f below = box;
+        below.upper[axis] = at;
+        CHECK(cut.side[0].bounds() == clip_triangle(v, below));
+    }
+}
+
+TEST_CASE("the sweep over sorted events finds what trying every plane finds") {
+    tools::Random random(8);
+    const Parallel parallel(1);
+    const BuildOptions options;
+    int cuts = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const KdCell cell = random_cell(random, parallel);
+        const KdPlane plane = find_cheapest_plane(cell, options, parallel);
+        CHECK(plane.cost == cheapest_cost(cell, options));
+        cuts += plane.is_cut();
+    }
+    CHECK(cuts > 1000);
+}
+
+TEST_CASE("events handed down are those that the children would have sorted anew") {
+    const Parallel parallel(1);
+    const TriangleMesh mesh = tools::make_soup(300, 9);
+    KdCell cell;
+    cell.references = collect_references(mesh.view(), parallel).items;
+    for (const Reference& r : cell.references) cell.bounds.extend(r.bounds());
+    cell.events = make_events(cell.references, parallel);
+    cell.spare = 1000;
+    for (int axis = 0; axis < 3; ++axis) {
+        const KdPlane plane{0.0, cell.bounds.center()[axis], axis, 0};
+        KdChildren children = cut_cell(mesh.view(), cell, plane);
+        CHECK(children.whole[0] < children.cell[0].references.size());
+        split_events(cell.events, children, parallel);
+        for (const KdCell& child : children.cell) {
+            CHECK(child.events == make_events(child.references, parallel));
+        }
     }
 }
 
