@@ -12,7 +12,10 @@ namespace packet {
 
 /// The acceleration structures. They differ in how they are built, not in what they answer.
 enum class AccelKind : std::uint8_t {
-    kBvh  ///< bounding volume hierarchy by the binned surface area heuristic
+    kBvh,         ///< bounding volume hierarchy by the binned surface area heuristic
+    kKdMidpoint,  ///< k-d tree, cells cut in the middle, axes in turn
+    kKdMedian,    ///< k-d tree, cells cut at the median of what they hold, axes in turn
+    kKdSah        ///< k-d tree, cells cut by the surface area heuristic
 };
 
 struct BuildOptions {
@@ -23,6 +26,11 @@ struct BuildOptions {
     float traversal_cost = 1.0f;
     /// Cost of testing a triangle. Only its ratio to `traversal_cost` matters.
     float intersection_cost = 1.0f;
+    /// References to triangles, at most, in multiples of the triangles, 1 to 64, where cells cut
+    /// triangles (k-d trees). A part of the tree that has used up its share parts triangles without
+    /// cutting them. Raise it for long triangles that cross many cells; a reference takes 40 bytes,
+    /// while building 250.
+    float max_reference_factor = 8.0f;
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
     /// the same for any number.
     int threads = 0;

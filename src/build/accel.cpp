@@ -1,5 +1,6 @@
 // The table of structures: a new one adds a line to each of the two tables below.
 #include "build/bvh_sah.h"
+#include "build/kd_tree.h"
 #include "build/tree.h"
 #include "core/macros.h"
 #include "core/names.h"
@@ -11,7 +12,9 @@
 
 namespace packet {
 
-static constexpr std::array kAccelNames = {AccelName{AccelKind::kBvh, "bvh"}};
+static constexpr std::array kAccelNames = {
+    AccelName{AccelKind::kBvh, "bvh"}, AccelName{AccelKind::kKdMidpoint, "kd-midpoint"},
+    AccelName{AccelKind::kKdMedian, "kd-median"}, AccelName{AccelKind::kKdSah, "kd-sah"}};
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
 
@@ -26,10 +29,16 @@ AccelKind parse_accel(std::string_view name) {
     return find_by_name(kAccelNames, name, "structure").kind;
 }
 
-static Hierarchy build_hierarchy(AlignedVector<Reference> references, const BuildOptions& options,
-                                 const Parallel& parallel) {
+static Hierarchy build_hierarchy(MeshView mesh, AlignedVector<Reference> references,
+                                 const BuildOptions& options, const Parallel& parallel) {
+    const auto kd_tree = [&](KdRule rule) {
+        return build_kd_tree(rule, mesh, std::move(references), options, parallel);
+    };
     switch (options.accel) {
         case AccelKind::kBvh: return build_bvh_sah(std::move(references), options, parallel);
+        case AccelKind::kKdMidpoint: return kd_tree(KdRule::kMidpoint);
+        case AccelKind::kKdMedian: return kd_tree(KdRule::kMedian);
+        case AccelKind::kKdSah: return kd_tree(KdRule::kSah);
     }
     PACKET_ASSERT(!"an AccelKind that is not in the enumeration");
     return {};
@@ -43,8 +52,8 @@ Tree build_tree(MeshView mesh, const BuildOptions& options) {
     References references;
     parallel.run([&] { references = collect_references(mesh, parallel); });
     const SkippedTriangles skipped = references.skipped;
-    Tree tree = make_tree(build_hierarchy(std::move(references.items), options, parallel), mesh,
-                          options, parallel);
+    Tree tree = make_tree(build_hierarchy(mesh, std::move(references.items), options, parallel),
+                          mesh, options, parallel);
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();

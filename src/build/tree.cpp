@@ -147,6 +147,8 @@ void validate(const BuildOptions& options) {
           "BuildOptions::traversal_cost must be 0 to 1e6");
     check(options.intersection_cost > 0.0f && options.intersection_cost <= 1e6f,
           "BuildOptions::intersection_cost must be above 0, up to 1e6");
+    check(options.max_reference_factor >= 1.0f && options.max_reference_factor <= 64.0f,
+          "BuildOptions::max_reference_factor must be 1 to 64");
 }
 
 }  // namespace packet

@@ -1,0 +1,103 @@
+#include "build/kd_cell.h"
+
+#include "build/clip.h"
+#include "core/macros.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace packet {
+
+KdCost::KdCost(const KdCell& cell, const BuildOptions& options) noexcept {
+    double extent[3];
+    for (int a = 0; a < 3; ++a) {
+        lower_[a] = static_cast<double>(cell.bounds.lower[a]);
+        upper_[a] = static_cast<double>(cell.bounds.upper[a]);
+        extent[a] = upper_[a] - lower_[a];
+    }
+    for (int a = 0; a < 3; ++a) {
+        section_[a] = extent[(a + 1) % 3] * extent[(a + 2) % 3];
+        rim_[a] = extent[(a + 1) % 3] + extent[(a + 2) % 3];
+    }
+    const double whole = area(0, extent[0]);
+    intersection_ = static_cast<double>(options.intersection_cost);
+    traversal_ = static_cast<double>(options.traversal_cost) * whole;
+    leaf_ = intersection_ * whole * static_cast<double>(cell.references.size());
+}
+
+static void add(KdCell& child, const Reference& r) {
+    child.references.push_back(r);
+    child.bounds.extend(r.bounds());
+}
+
+/// `side_of(i)` tells where reference i goes.
+template <class SideOf>
+static void deal_whole(const KdCell& cell, KdChildren& out, SideOf side_of) {
+    const std::size_t count = cell.references.size();
+    out.places.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const int side = side_of(i);
+        if (side == kBothSides) {
+            out.places[i] = kCut;
+            continue;
+        }
+        KdCell& child = out.cell[static_cast<std::size_t>(side)];
+        out.places[i] =
+            static_cast<KdPlace>(2 * child.references.size()) + static_cast<KdPlace>(side);
+        add(child, cell.references[i]);
+    }
+    for (std::size_t s = 0; s < 2; ++s) out.whole[s] = out.cell[s].references.size();
+}
+
+/// What the cut has not used up, in proportion to the children's references.
+static void share_spare(const KdCell& cell, KdChildren& out) {
+    const std::size_t n0 = out.cell[0].references.size(), n1 = out.cell[1].references.size();
+    PACKET_ASSERT(n0 + n1 <= cell.references.size() + cell.spare);
+    const std::size_t left = cell.references.size() + cell.spare - (n0 + n1);
+    const double share =
+        static_cast<double>(n0) / static_cast<double>(std::max<std::size_t>(n0 + n1, 1));
+    out.cell[0].spare = std::min(left, static_cast<std::size_t>(share * static_cast<double>(left)));
+    out.cell[1].spare = left - out.cell[0].spare;
+    for (KdCell& child : out.cell) child.depth = cell.depth + 1;
+}
+
+KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane) {
+    KdChildren out;
+    deal_whole(cell, out, [&](std::size_t i) { return plane.side_of(cell.references[i]); });
+    for (std::size_t i = 0; i < cell.references.size(); ++i) {
+        if (out.places[i] != kCut) continue;
+        const CutReference cut =
+            cut_reference(mesh, cell.references[i], plane.axis, plane.position);
+        for (std::size_t s = 0; s < 2; ++s) {
+            if (!cut.side[s].bounds().empty()) add(out.cell[s], cut.side[s]);
+        }
+    }
+    share_spare(cell, out);
+    return out;
+}
+
+KdChildren halve_cell(const KdCell& cell) {
+    const glm::vec3 extent = cell.bounds.extent();
+    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
+                     : extent.y >= extent.z                       ? 1
+                                                                  : 2;
+    const auto centroid2 = [&](std::uint32_t i) {
+        return cell.references[i].lower[axis] + cell.references[i].upper[axis];
+    };
+    std::vector<std::uint32_t> order(cell.references.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const std::size_t half = order.size() / 2;
+    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                         const float ca = centroid2(a), cb = centroid2(b);
+                         return ca < cb || (ca == cb && a < b);
+                     });
+    std::vector<std::uint8_t> side(order.size(), 0);
+    for (std::size_t i = half; i < order.size(); ++i) side[order[i]] = 1;
+    KdChildren out;
+    deal_whole(cell, out, [&](std::size_t i) { return static_cast<int>(side[i]); });
+    share_spare(cell, out);
+    return out;
+}
+
+}  // namespace packet

@@ -1,0 +1,102 @@
+// A cell of space while a k-d tree is built: what it refers to, what cutting it would cost, and how
+// a plane cuts it.
+#pragma once
+
+#include "build/references.h"
+
+#include <packet/accel.h>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace packet {
+
+/// Where boxes begin and end along each axis, in the order in which a plane meets them; kd_events.h
+/// says how they are stored.
+using EventLists = std::array<std::vector<std::uint64_t>, 3>;
+
+struct KdCell {
+    AlignedVector<Reference> references;  ///< boxes of the parts of triangles in this cell
+    Bounds3f bounds;                      ///< theirs: cells end where their contents do
+    EventLists events;                    ///< kd-sah only
+    std::size_t spare = 0;                ///< how many references cuts in here may add
+    int depth = 0;
+};
+
+/// Two sides have references; one that reaches to both is cut and counts on both.
+inline constexpr int kBothSides = 2;
+
+struct KdPlane {
+    double cost = 0.0;
+    float position = 0.0f;
+    int axis = -1;      ///< -1: no cut
+    int flat_side = 0;  ///< where references go that lie in the plane
+
+    [[nodiscard]] bool is_cut() const noexcept { return axis >= 0; }
+    [[nodiscard]] int side_of(const Reference& r) const noexcept {
+        if (r.lower[axis] == position && r.upper[axis] == position) return flat_side;
+        if (r.upper[axis] <= position) return 0;
+        return r.lower[axis] >= position ? 1 : kBothSides;
+    }
+};
+
+struct KdCounts {
+    std::size_t side[2] = {0, 0};
+
+    /// A cut must leave something on both sides and not add more references than the cell may.
+    [[nodiscard]] bool allow_cut(const KdCell& cell) const noexcept {
+        return side[0] != 0 && side[1] != 0 &&
+               side[0] + side[1] <= cell.references.size() + cell.spare;
+    }
+};
+
+/// The surface area heuristic for one cell. All costs have the cell's area as a factor, so that
+/// flat cells need no division.
+class KdCost {
+public:
+    KdCost(const KdCell& cell, const BuildOptions& options) noexcept;
+
+    [[nodiscard]] double leaf() const noexcept { return leaf_; }
+    /// One side ends at `end` and the other begins at `begin`, at most what lies between is empty.
+    [[nodiscard]] double cut(int axis, float end, float begin,
+                             const KdCounts& counts) const noexcept {
+        const double below = static_cast<double>(end) - lower_[axis];
+        const double above = upper_[axis] - static_cast<double>(begin);
+        return traversal_ +
+               intersection_ * (static_cast<double>(counts.side[0]) * area(axis, below) +
+                                static_cast<double>(counts.side[1]) * area(axis, above));
+    }
+
+private:
+    /// Half the surface of a slice of the cell.
+    [[nodiscard]] double area(int axis, double length) const noexcept {
+        return section_[axis] + length * rim_[axis];
+    }
+
+    double lower_[3], upper_[3];
+    double section_[3];  ///< area of the cell's cross section
+    double rim_[3];      ///< half the section's circumference
+    double intersection_, traversal_, leaf_;
+};
+
+/// Where one of the parent's references is now: 2 * index + side, or kCut.
+using KdPlace = std::uint32_t;
+inline constexpr KdPlace kCut = 0xFFFFFFFF;
+
+/// The halves of a cell. References that were not cut come first, in their old order.
+struct KdChildren {
+    std::array<KdCell, 2> cell;
+    std::array<std::size_t, 2> whole = {0, 0};  ///< how many are not cut
+    std::vector<KdPlace> places;
+};
+
+/// Cuts references along with space. No point of a triangle is lost; a child is empty if what the
+/// plane seemed to cut off is not there. The children share the spare references by their sizes.
+[[nodiscard]] KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane);
+
+/// Deals the references out to two children that may overlap, half to each, by their centroids
+/// along the widest axis: for what no plane parts, like triangles that share a vertex.
+[[nodiscard]] KdChildren halve_cell(const KdCell& cell);
+
+}  // namespace packet

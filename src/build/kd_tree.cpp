@@ -1,0 +1,199 @@
+// Every k-d tree is built by the same recursion: find a plane by the tree's rule, cut the cell, and
+// again. Cells shrink to what they hold, so nodes are boxes as in any other tree and no space that
+// is empty is ever in one. What no plane parts well is dealt out to two nodes that overlap.
+//
+// Wald, Havran. On building fast kd-trees for ray tracing, and on doing that in O(N log N).
+// Interactive Ray Tracing 2006.
+#include "build/kd_tree.h"
+
+#include "build/kd_cell.h"
+#include "build/kd_events.h"
+#include "core/macros.h"
+#include "core/views.h"
+
+#include <packet/error.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+namespace packet {
+
+namespace {
+
+// Below this a task costs more than the work it moves to another core.
+constexpr std::size_t kTaskSize = 4096;
+// References are named by 31 bits; two values are kept for misses.
+constexpr std::size_t kMaxReferences = (std::size_t{1} << 31) - 2;
+
+/// What one task builds, as in Hierarchy. Nodes of tasks of their own hang on the root.
+struct Subtree {
+    std::vector<BuildNode> nodes;
+    AlignedVector<Reference> references;
+    std::unique_ptr<Subtree> child[2];  ///< both or none; then the root is all there is here
+};
+
+/// Puts the subtrees into one hierarchy, in depth-first order. Yields the root's index.
+std::uint32_t append(Subtree& from, Hierarchy& to) {
+    const auto base = static_cast<std::uint32_t>(to.nodes.size());
+    const auto first = static_cast<std::uint32_t>(to.references.size());
+    for (BuildNode node : from.nodes) {
+        node.first += node.is_leaf() ? first : base;
+        node.second += base;
+        to.nodes.push_back(node);
+    }
+    to.references.insert(to.references.end(), from.references.begin(), from.references.end());
+    if (from.child[0] != nullptr) {
+        to.nodes[base].first = append(*from.child[0], to);
+        to.nodes[base].second = append(*from.child[1], to);
+    }
+    from = {};
+    return base;
+}
+
+class Builder {
+public:
+    Builder(KdRule rule, MeshView mesh, const BuildOptions& options, const Parallel& parallel)
+        : rule_(rule), mesh_(mesh), options_(options), parallel_(parallel) {}
+
+    Hierarchy build(AlignedVector<Reference> references) {
+        Hierarchy out;
+        if (references.empty()) return out;
+        const auto n = static_cast<double>(references.size());
+        // Wald and Havran: deeper cuts do not pay.
+        max_cut_depth_ = std::min(kMaxDepth, static_cast<int>(8.0 + 1.3 * std::log2(n)));
+        KdCell root;
+        const double allowed = std::min(n * static_cast<double>(options_.max_reference_factor),
+                                        static_cast<double>(max_references()));
+        root.spare = static_cast<std::size_t>(allowed) - references.size();
+        for (const Reference& r : references) root.bounds.extend(r.bounds());
+        root.references = std::move(references);
+        Subtree tree;
+        parallel_.run([&] {
+            if (rule_ == KdRule::kSah) root.events = make_events(root.references, parallel_);
+            build_node(std::move(root), tree);
+        });
+        append(tree, out);
+        return out;
+    }
+
+    [[nodiscard]] std::size_t max_references() const {
+        return rule_ == KdRule::kSah ? kMaxEventReferences : kMaxReferences;
+    }
+
+private:
+    void build_node(KdCell cell, Subtree& out) {
+        const std::size_t slot = out.nodes.size();
+        out.nodes.push_back({cell.bounds});
+        const std::size_t count = cell.references.size();
+        std::optional<KdChildren> children = divide(cell);
+        if (!children) {
+            BuildNode& leaf = out.nodes[slot];
+            leaf.first = static_cast<std::uint32_t>(out.references.size());
+            leaf.count = static_cast<std::uint32_t>(count);
+            out.references.insert(out.references.end(), cell.references.begin(),
+                                  cell.references.end());
+            return;
+        }
+        cell = {};  // it would otherwise stay while all below is built
+        if (count > kTaskSize) {
+            // Its parent was as large, so this is the root of its subtree.
+            PACKET_ASSERT(slot == 0);
+            for (auto& child : out.child) child = std::make_unique<Subtree>();
+            parallel_.both([&] { build_node(std::move(children->cell[0]), *out.child[0]); },
+                           [&] { build_node(std::move(children->cell[1]), *out.child[1]); });
+            return;
+        }
+        out.nodes[slot].first = static_cast<std::uint32_t>(out.nodes.size());
+        build_node(std::move(children->cell[0]), out);
+        out.nodes[slot].second = static_cast<std::uint32_t>(out.nodes.size());
+        build_node(std::move(children->cell[1]), out);
+    }
+
+    /// The two cells to go on with, or none for a leaf. May shrink the cell on the way.
+    std::optional<KdChildren> divide(KdCell& cell) const {
+        for (;;) {
+            const std::size_t count = cell.references.size();
+            if (count == 1) return {};
+            const KdPlane plane = cell.depth < max_cut_depth_ ? find_plane(cell) : KdPlane{};
+            const bool is_small = count <= static_cast<std::size_t>(options_.max_leaf_size);
+            if (!plane.is_cut() && is_small) return {};
+            KdChildren children = plane.is_cut() ? cut_cell(mesh_, cell, plane) : halve_cell(cell);
+            if (!fits_depth(children)) {
+                if (is_small) return {};
+                children = halve_cell(cell);
+            }
+            if (rule_ == KdRule::kSah) split_events(cell.events, children, parallel_);
+            auto& [cell0, cell1] = children.cell;
+            if (!cell0.references.empty() && !cell1.references.empty()) return children;
+            // A node of one child is that child.
+            cell = std::move(cell0.references.empty() ? cell1 : cell0);
+        }
+    }
+
+    /// Whether the larger child can still be halved down to one reference within kMaxDepth.
+    /// Halving keeps the condition, so by induction no leaf is deeper than that.
+    static bool fits_depth(const KdChildren& children) {
+        const std::size_t larger =
+            std::max(children.cell[0].references.size(), children.cell[1].references.size());
+        return children.cell[0].depth + static_cast<int>(std::bit_width(larger - 1)) <= kMaxDepth;
+    }
+
+    KdPlane find_plane(const KdCell& cell) const {
+        if (rule_ == KdRule::kSah) return find_cheapest_plane(cell, options_, parallel_);
+        const KdCost cost(cell, options_);
+        // An axis along which cutting does not pay leaves its turn to the next.
+        for (int turn = 0; turn < 3; ++turn) {
+            const int axis = (cell.depth + turn) % 3;
+            KdPlane plane;
+            plane.axis = axis;
+            plane.position = rule_ == KdRule::kMedian ? median(cell, axis) : middle(cell, axis);
+            KdCounts counts;
+            for (const Reference& r : cell.references) {
+                const int side = plane.side_of(r);
+                counts.side[0] += side != 1;
+                counts.side[1] += side != 0;
+            }
+            plane.cost = cost.cut(axis, plane.position, plane.position, counts);
+            if (counts.allow_cut(cell) && plane.cost < cost.leaf()) return plane;
+        }
+        return {};
+    }
+
+    static float middle(const KdCell& cell, int axis) { return cell.bounds.center()[axis]; }
+
+    static float median(const KdCell& cell, int axis) {
+        std::vector<float> centroids;
+        centroids.reserve(cell.references.size());
+        for (const Reference& r : cell.references) centroids.push_back(r.bounds().center()[axis]);
+        const auto half = centroids.begin() + static_cast<std::ptrdiff_t>(centroids.size() / 2);
+        std::nth_element(centroids.begin(), half, centroids.end());
+        // Between the two in the middle, so that a plane at a median cuts no more than it must.
+        const float below =
+            half == centroids.begin() ? *half : *std::max_element(centroids.begin(), half);
+        return 0.5f * below + 0.5f * *half;
+    }
+
+    KdRule rule_;
+    MeshView mesh_;
+    const BuildOptions& options_;
+    const Parallel& parallel_;
+    int max_cut_depth_ = 0;
+};
+
+}  // namespace
+
+Hierarchy build_kd_tree(KdRule rule, MeshView mesh, AlignedVector<Reference> references,
+                        const BuildOptions& options, const Parallel& parallel) {
+    Builder builder(rule, mesh, options, parallel);
+    if (references.size() > builder.max_references()) {
+        throw Error(ErrorCode::kTooLarge, "a k-d tree refers to at most " +
+                                              std::to_string(builder.max_references()) +
+                                              " triangles");
+    }
+    return builder.build(std::move(references));
+}
+
+}  // namespace packet
