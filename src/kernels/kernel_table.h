@@ -33,6 +33,9 @@ struct KernelTable {
     using Any = std::uint32_t (*)(const SceneView&, const RayPacket<N>&,
                                   std::uint32_t active) noexcept;
 
+    using Overlap8 = std::uint32_t (*)(const float (&triangle)[3][3], const float (&lower)[3][8],
+                                       const float (&upper)[3][8]) noexcept;
+
     enum Width { kWidth1, kWidth8, kWidth16, kWidthCount };
     enum Counting { kNotCounting, kCounting, kCountingCount };
 
@@ -42,6 +45,8 @@ struct KernelTable {
     Closest<16> closest16;
     Any<8> any8;
     Any<16> any16;
+    Overlap8 overlap_axes8;  ///< by separating axes: which of 8 boxes overlap, bit i for box i
+    Overlap8 overlap_clip8;  ///< by clipping; the same answer
 };
 
 const KernelTable& kernel_table_scalar() noexcept;

@@ -4,6 +4,8 @@
 #include "kernels/counters.h"
 #include "kernels/kernel_table.h"
 #include "kernels/scene_walk.h"
+#include "kernels/triangle_box_axes.h"
+#include "kernels/triangle_box_clip.h"
 
 namespace packet {
 
@@ -165,6 +167,8 @@ constexpr KernelTable make_kernel_table() {
     table.closest16 = closest_packet<16, Isa>;
     table.any8 = any_packet<8, Isa>;
     table.any16 = any_packet<16, Isa>;
+    table.overlap_axes8 = overlap_axes<8, Isa>;
+    table.overlap_clip8 = overlap_clip<8, Isa>;
     return table;
 }
 
