@@ -31,7 +31,7 @@ static Hierarchy build_hierarchy(AlignedVector<Reference> references, const Buil
     switch (options.accel) {
         case AccelKind::kBvh: return build_bvh_sah(std::move(references), options, parallel);
     }
-    PACKET_ASSERT(!"an AccelKind that is not in the enumeration");
+    PACKET_ASSERT(false && "an AccelKind that is not in the enumeration");
     return {};
 }
 
