@@ -141,7 +141,7 @@ std::vector<unsigned char> bytes_of(const Tree& tree) {
 
 TEST_CASE("a tree holds every triangle, whole or in parts, in boxes that contain it") {
     for (const tools::SceneKind& kind : tools::kSceneKinds) {
-        for (const std::size_t count : {1, 2, 3, 10, 1000, 10000}) {
+        for (const std::size_t count : {1u, 2u, 3u, 10u, 1000u, 10000u}) {
             CAPTURE(kind.name);
             CAPTURE(count);
             for_each_accel(
@@ -255,15 +255,16 @@ TEST_CASE("bad options and bad indices are errors that name them") {
     const TriangleMesh mesh = tools::make_soup(10, 1);
     BuildOptions options;
     options.max_leaf_size = 0;
-    CHECK_THROWS_WITH_AS(build_tree(mesh.view(), options),
+    CHECK_THROWS_WITH_AS((void)build_tree(mesh.view(), options),
                          "BuildOptions::max_leaf_size must be 1 to 64", Error);
     options = {};
     options.traversal_cost = std::nanf("");
-    CHECK_THROWS_AS(build_tree(mesh.view(), options), Error);
+    CHECK_THROWS_AS((void)build_tree(mesh.view(), options), Error);
     options = {};
     options.threads = -1;
-    CHECK_THROWS_AS(build_tree(mesh.view(), options), Error);
+    CHECK_THROWS_AS((void)build_tree(mesh.view(), options), Error);
     TriangleMesh bad = mesh;
     bad.triangles[4].y = 30;
-    CHECK_THROWS_WITH_AS(build_tree(bad.view(), {}), "triangle 4 refers to vertex 30 of 30", Error);
+    CHECK_THROWS_WITH_AS((void)build_tree(bad.view(), {}), "triangle 4 refers to vertex 30 of 30",
+                         Error);
 }

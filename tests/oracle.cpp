@@ -75,14 +75,37 @@ float exact_edge(float ax, float by, float ay, float bx) {
     return rounded;
 }
 
+/// Where the ray meets the triangle's plane, and the last two barycentric coordinates.
+struct Meeting {
+    float t, u, v;
+};
+
+Meeting meet_in_double(const float (&x)[3], const float (&y)[3], const float (&depth)[3], float sz) {
+    const auto edge = [&](int a, int b) {
+        return static_cast<double>(x[a]) * static_cast<double>(y[b]) -
+               static_cast<double>(y[a]) * static_cast<double>(x[b]);
+    };
+    const double u = edge(2, 1), v = edge(0, 2), w = edge(1, 0), det = u + v + w;
+    const double t = u / det * static_cast<double>(depth[0]) +
+                     v / det * static_cast<double>(depth[1]) +
+                     w / det * static_cast<double>(depth[2]);
+    return {static_cast<float>(t * static_cast<double>(sz)), static_cast<float>(v / det),
+            static_cast<float>(w / det)};
+}
+
+float largest(const float (&a)[3]) {
+    return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])});
+}
+
 /// A hit with prim_id 0, or a miss.
 Hit meet_triangle(const MeshRay& r, const glm::vec3 (&corner)[3]) {
-    float x[3], y[3], z[3];
+    float x[3], y[3], z[3], depth[3];
     for (int i = 0; i < 3; ++i) {
         const glm::vec3 p = corner[i] - r.org;
         x[i] = p[r.kx] - r.sx * p[r.kz];
         y[i] = p[r.ky] - r.sy * p[r.kz];
-        z[i] = r.sz * p[r.kz];
+        depth[i] = p[r.kz];
+        z[i] = r.sz * depth[i];
     }
     float u = edge(x[2], y[1], y[2], x[1]);
     float v = edge(x[0], y[2], y[0], x[2]);
@@ -102,12 +125,14 @@ Hit meet_triangle(const MeshRay& r, const glm::vec3 (&corner)[3]) {
         upper[a] = std::max({corner[0][a], corner[1][a], corner[2][a]});
     }
     const Slab box = meet_box(r, lower, upper);
-    float t = u / det * z[0] + v / det * z[1] + w / det * z[2];
+    Meeting m{u / det * z[0] + v / det * z[1] + w / det * z[2], v / det, w / det};
+    if (2.0f * std::fabs(det) < largest(x) * largest(y)) m = meet_in_double(x, y, depth, r.sz);
+    float t = m.t;
     if (std::isnan(t) || box.enter > box.exit) return {};
     t = std::min(std::max(t, box.enter), box.exit);
     if (!(r.tnear <= t && t <= r.tfar)) return {};
     // + 0 makes -0 a 0: a hit has one representation
-    return {t + 0.0f, v / det + 0.0f, w / det + 0.0f, 0, 0, 0};
+    return {t + 0.0f, m.u + 0.0f, m.v + 0.0f, 0, 0, 0};
 }
 
 }  // namespace

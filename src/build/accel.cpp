@@ -40,7 +40,7 @@ static Hierarchy build_hierarchy(MeshView mesh, AlignedVector<Reference> referen
         case AccelKind::kKdMedian: return kd_tree(KdRule::kMedian);
         case AccelKind::kKdSah: return kd_tree(KdRule::kSah);
     }
-    PACKET_ASSERT(!"an AccelKind that is not in the enumeration");
+    PACKET_ASSERT(false && "an AccelKind that is not in the enumeration");
     return {};
 }
 

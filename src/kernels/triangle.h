@@ -60,6 +60,50 @@ template <int N, class Isa>
     edges = {Float<N, Isa>::load(u), Float<N, Isa>::load(v), Float<N, Isa>::load(w)};
 }
 
+/// Barycentric coordinates from edge functions in float are off by about 2^-24 |x| |y| / |det|, where x
+/// and y are the largest of the sheared corners. Beyond this condition, as where a ray all but lies in
+/// the triangle's plane, t would not be where the two meet, and a cell that holds a part of the
+/// triangle might be skipped: then it is computed in double. (Up to it the error stays within the
+/// slack of boxes.) Decided from floats that are the same on every ISA.
+inline constexpr float kWorstCondition = 2.0f;
+
+template <int N, class Isa>
+PACKET_INLINE Mask<N, Isa> is_ill_conditioned(const Float3<N, Isa> (&p)[3],
+                                              const Float<N, Isa>& det) {
+    const Float<N, Isa> x = max(abs(p[0].x), max(abs(p[1].x), abs(p[2].x)));
+    const Float<N, Isa> y = max(abs(p[0].y), max(abs(p[1].y), abs(p[2].y)));
+    return abs(det) * Float<N, Isa>(kWorstCondition) < x * y;
+}
+
+/// t, u and v of the lanes in `bits`, in double from the sheared corners.
+template <int N, class Isa>
+[[gnu::noinline]] void refine_hits(const Float3<N, Isa> (&p)[3], const Float<N, Isa>& scale_z,
+                                   std::uint32_t bits, TriangleHits<N, Isa>& hits) {
+    float x[3][N], y[3][N], z[3][N], scale[N], t[N], u[N], v[N];
+    for (int corner = 0; corner < 3; ++corner) {
+        p[corner].x.store(x[corner]);
+        p[corner].y.store(y[corner]);
+        p[corner].z.store(z[corner]);
+    }
+    scale_z.store(scale), hits.t.store(t), hits.u.store(u), hits.v.store(v);
+    for (; bits != 0; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const auto edge = [&](int a, int b) {  // exact products, one rounding
+            return static_cast<double>(x[a][i]) * y[b][i] - static_cast<double>(y[a][i]) * x[b][i];
+        };
+        const double edges[3] = {edge(2, 1), edge(0, 2), edge(1, 0)};
+        const double det = edges[0] + edges[1] + edges[2];
+        const double weights[3] = {edges[0] / det, edges[1] / det, edges[2] / det};
+        const double depth = weights[0] * z[0][i] + weights[1] * z[1][i] + weights[2] * z[2][i];
+        t[i] = static_cast<float>(depth * scale[i]);
+        u[i] = static_cast<float>(weights[1]);
+        v[i] = static_cast<float>(weights[2]);
+    }
+    hits.t = Float<N, Isa>::load(t);
+    hits.u = Float<N, Isa>::load(u);
+    hits.v = Float<N, Isa>::load(v);
+}
+
 /// A corner seen from the ray: sheared so that the ray runs along z from the origin.
 template <Directions directions, int N, class Isa>
 PACKET_INLINE Float3<N, Isa> to_ray_space(const PreparedRays<N, Isa>& ray,
@@ -122,19 +166,24 @@ PACKET_INLINE TriangleHits<N, Isa> test_triangles(const PreparedRays<N, Isa>& ra
               ~(det == zero);
     if (none(out.hit)) return out;
 
-    const F u = e.u / det, v = e.v / det, w = e.w / det;
-    F t = u * (ray.scale_z * p[0].z) + v * (ray.scale_z * p[1].z) + w * (ray.scale_z * p[2].z);
+    // u and v are the barycentric coordinates that belong to the second and third corner
+    const F first = e.u / det;
+    out.u = e.v / det, out.v = e.w / det;
+    out.t = first * (ray.scale_z * p[0].z) + out.u * (ray.scale_z * p[1].z) +
+            out.v * (ray.scale_z * p[2].z);
+    const Mask<N, Isa> ill = out.hit & is_ill_conditioned(p, det);
+    if (any(ill)) refine_hits(p, ray.scale_z, ill.bits(), out);
     F xyz[3][3];
     for (int corner = 0; corner < 3; ++corner) {
         for (int a = 0; a < 3; ++a) xyz[corner][a] = corners(corner, a);
     }
     const Interval<N, Isa> box = triangle_box(ray, xyz);
     // max and min yield their second operand for NaN: a NaN stays one and fails the comparisons
-    t = min(box.exit, max(box.enter, t)) + zero;  // + 0 makes -0 a 0
+    const F t = min(box.exit, max(box.enter, out.t)) + zero;  // + 0 makes -0 a 0
     out.hit = out.hit & (box.enter <= box.exit) & (ray.tnear <= t) & (t <= best_t);
     out.t = t;
-    out.u = v + zero;  // the barycentric coordinate that belongs to the second corner
-    out.v = w + zero;
+    out.u = out.u + zero;
+    out.v = out.v + zero;
     return out;
 }
 
