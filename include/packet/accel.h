@@ -28,9 +28,9 @@ struct BuildOptions {
     float intersection_cost = 1.0f;
     /// References to triangles, at most, in multiples of the triangles, 1 to 64, where cells cut
     /// triangles (k-d trees). A part of the tree that has used up its share parts triangles without
-    /// cutting them. Raise it for long triangles that cross many cells; a reference takes 40 bytes,
-    /// while building 250.
-    float max_reference_factor = 8.0f;
+    /// cutting them. Lower it to save memory, 40 bytes a reference and while building about 250.
+    /// Doubling it lowers the SAH cost of generated scenes by 0 to 8%, mostly below 3%.
+    float max_reference_factor = 4.0f;
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
     /// the same for any number.
     int threads = 0;
