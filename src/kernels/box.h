@@ -41,10 +41,8 @@ PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray, const Node
         Interval<N, Isa> out;
         for (int a = 0; a < 3; ++a) {
             const int near = ray.near_side[a];
-            const F& org_near = near == 0 ? ray.org_plus[a] : ray.org_minus[a];
-            const F& org_far = near == 0 ? ray.org_minus[a] : ray.org_plus[a];
-            const F t_near = (F(node.plane[near][a]) - org_near) * ray.inv_dir[a];
-            const F t_far = (F(node.plane[1 - near][a]) - org_far) * ray.inv_dir[a];
+            const F t_near = (F(node.plane[near][a]) - ray.org_near[a]) * ray.inv_dir[a];
+            const F t_far = (F(node.plane[1 - near][a]) - ray.org_far[a]) * ray.inv_dir[a];
             out.enter = a == 0 ? t_near : max(out.enter, t_near);
             out.exit = a == 0 ? t_far : min(out.exit, t_far);
         }

@@ -102,6 +102,10 @@ PACKET_INLINE void prepare_directions(PreparedRays<N, Isa>& out, std::uint32_t a
         out.near_side[a] = negative != 0 ? 1 : 0;
     }
     if (out.directions == Directions::kMixed) return;
+    for (int a = 0; a < 3; ++a) {
+        out.org_near[a] = out.near_side[a] == 0 ? out.org_plus[a] : out.org_minus[a];
+        out.org_far[a] = out.near_side[a] == 0 ? out.org_minus[a] : out.org_plus[a];
+    }
     constexpr int kNext[3] = {1, 2, 0};
     out.axis[0] = kNext[z_axis];
     out.axis[1] = kNext[kNext[z_axis]];

@@ -20,8 +20,8 @@ struct WideRay {
     PACKET_INLINE explicit WideRay(const PreparedRays<kWideSize, Isa>& ray) : tnear(ray.tnear) {
         for (int a = 0; a < 3; ++a) {
             near_side[a] = ray.near_side[a];
-            org_near[a] = near_side[a] == 0 ? ray.org_plus[a] : ray.org_minus[a];
-            org_far[a] = near_side[a] == 0 ? ray.org_minus[a] : ray.org_plus[a];
+            org_near[a] = ray.org_near[a];
+            org_far[a] = ray.org_far[a];
             inv_dir[a] = ray.inv_dir[a];
         }
     }

@@ -172,7 +172,12 @@ PACKET_INLINE TriangleHits<N, Isa> test_triangles(const PreparedRays<N, Isa>& ra
     out.t = first * (ray.scale_z * p[0].z) + out.u * (ray.scale_z * p[1].z) +
             out.v * (ray.scale_z * p[2].z);
     const Mask<N, Isa> ill = out.hit & is_ill_conditioned(p, det);
-    if (any(ill)) refine_hits(p, ray.scale_z, ill.bits(), out);
+    if (any(ill)) {
+        const Float3<N, Isa> ill_corners[3] = {p[0], p[1], p[2]};  // copies, as above
+        TriangleHits<N, Isa> refined = out;
+        refine_hits(ill_corners, ray.scale_z, ill.bits(), refined);
+        out = refined;
+    }
     F xyz[3][3];
     for (int corner = 0; corner < 3; ++corner) {
         for (int a = 0; a < 3; ++a) xyz[corner][a] = corners(corner, a);
