@@ -1,5 +1,8 @@
 // packet_micro: every mode by every instruction set on small generated scenes, with the work that a
-// ray takes. It answers why something is slow; packet_bench answers whether it is.
+// ray takes. It answers why something is slow; packet_bench answers whether it is. And the parts of
+// builders that kernels serve.
+#include "micro_overlap.h"
+
 #include <packet/isa.h>
 #include <packet/scene.h>
 #include <packet/trace.h>
@@ -97,6 +100,7 @@ int main(int argc, char** argv) {
             packet::bench::add_benchmarks(scene_kind, ray_kind);
         }
     }
+    packet::bench::add_overlap_benchmarks();
     benchmark::RunSpecifiedBenchmarks();
     benchmark::Shutdown();
 }

@@ -158,22 +158,20 @@ PACKET_INLINE bool plane_misses(const float (&v)[3][3], const int (&normal_sign)
            side_of_plane<Isa>(v[0], v[1], v[2], far) < 0;
 }
 
-/// Whether the box, seen along axis `a`, lies beyond one of the triangle's edges.
+/// Whether the box, seen along axis `a`, lies beyond one of the triangle's edges. A triangle seen
+/// from the side is a line, which has edges in both directions and so two outer sides.
 template <class Isa>
 PACKET_INLINE bool edge_parts(const float (&v)[3][3], int a, int area_sign, const float (&lower)[3],
                               const float (&upper)[3]) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
     for (int k = 0; k < 3; ++k) {
-        const float p[2] = {v[k][b], v[k][c]};
-        const float q[2] = {v[(k + 1) % 3][b], v[(k + 1) % 3][c]};
-        // The box's corners that lie farthest to the left and to the right of the edge.
+        // The edge with the triangle on its left, and the corner of the box farthest to its left.
+        const float(&from)[3] = v[area_sign < 0 ? (k + 1) % 3 : k];
+        const float(&to)[3] = v[area_sign < 0 ? k : (k + 1) % 3];
+        const float p[2] = {from[b], from[c]}, q[2] = {to[b], to[c]};
         const float left[2] = {q[1] < p[1] ? upper[b] : lower[b],
                                q[0] > p[0] ? upper[c] : lower[c]};
-        const float right[2] = {q[1] < p[1] ? lower[b] : upper[b],
-                                q[0] > p[0] ? lower[c] : upper[c]};
-        // An area of zero is a triangle seen from the side, which has no inner side.
-        if (area_sign >= 0 && side_of_line<Isa>(p, q, left) < 0) return true;
-        if (area_sign <= 0 && side_of_line<Isa>(p, q, right) > 0) return true;
+        if (side_of_line<Isa>(p, q, left) < 0) return true;
     }
     return false;
 }
