@@ -12,7 +12,8 @@ namespace packet {
 
 /// The acceleration structures. They differ in how they are built, not in what they answer.
 enum class AccelKind : std::uint8_t {
-    kBvh  ///< bounding volume hierarchy by the binned surface area heuristic
+    kBvh,         ///< bounding volume hierarchy by the binned surface area heuristic
+    kBvhMidpoint  ///< the same, split at the middle of the centroids
 };
 
 struct BuildOptions {

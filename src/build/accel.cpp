@@ -1,4 +1,5 @@
 // The table of structures: a new one adds a line to each of the two tables below.
+#include "build/bvh_midpoint.h"
 #include "build/bvh_sah.h"
 #include "build/tree.h"
 #include "core/macros.h"
@@ -11,7 +12,10 @@
 
 namespace packet {
 
-static constexpr std::array kAccelNames = {AccelName{AccelKind::kBvh, "bvh"}};
+static constexpr std::array kAccelNames = {
+    AccelName{AccelKind::kBvh, "bvh"},
+    AccelName{AccelKind::kBvhMidpoint, "bvh-midpoint"},
+};
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
 
@@ -30,8 +34,10 @@ static Hierarchy build_hierarchy(AlignedVector<Reference> references, const Buil
                                  const Parallel& parallel) {
     switch (options.accel) {
         case AccelKind::kBvh: return build_bvh_sah(std::move(references), options, parallel);
+        case AccelKind::kBvhMidpoint:
+            return build_bvh_midpoint(std::move(references), options, parallel);
     }
-    PACKET_ASSERT(!"an AccelKind that is not in the enumeration");
+    PACKET_ASSERT(false && "an AccelKind that is not in the enumeration");
     return {};
 }
 
