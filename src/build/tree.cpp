@@ -4,10 +4,14 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 namespace packet {
 
 namespace {
+
+constexpr std::uint32_t kNoReference = 0xFFFFFFFF;
+constexpr glm::vec3 kNowhere(std::numeric_limits<float>::quiet_NaN());
 
 /// Depth-first placement of a hierarchy's nodes, and of the items of its leaves by a policy.
 class Linearizer {
@@ -15,14 +19,11 @@ public:
     Linearizer(const Hierarchy& hierarchy, const BuildOptions& options, std::uint32_t block_size)
         : hierarchy_(hierarchy), options_(options), block_size_(block_size) {}
 
-    /// A leaf's references and the first item they become.
-    struct LeafItems {
-        std::uint32_t first_reference, count, first_item;
-    };
-
     void run(Tree& tree) {
         if (hierarchy_.references.empty()) return;
         tree.bounds = hierarchy_.nodes[0].bounds;
+        tree.nodes.reserve(hierarchy_.nodes.size());
+        reference_of_item_.reserve(hierarchy_.references.size());
         root_area_ = std::max(static_cast<double>(tree.bounds.half_area()),
                               std::numeric_limits<double>::min());
         // Iterative: the depth is bounded, but small stacks of threads are not ours to fill.
@@ -47,8 +48,10 @@ public:
         tree.stats.node_count = tree.nodes.size();
     }
 
-    [[nodiscard]] const std::vector<LeafItems>& leaves() const { return leaves_; }
-    [[nodiscard]] std::uint32_t item_count() const { return item_count_; }
+    /// By item; kNoReference where a block is filled up so that a leaf starts the next.
+    [[nodiscard]] std::span<const std::uint32_t> references_of_items() const {
+        return reference_of_item_;
+    }
 
 private:
     Node make_node(const BuildNode& source, int depth, BuildStats& stats) {
@@ -72,35 +75,38 @@ private:
     }
 
     std::uint32_t place_leaf(const BuildNode& leaf) {
-        const std::uint32_t used = item_count_ % block_size_;
-        if (used != 0 && used + leaf.count > block_size_) item_count_ += block_size_ - used;
-        leaves_.push_back({leaf.first, leaf.count, item_count_});
-        item_count_ += leaf.count;
-        return leaves_.back().first_item;
+        const std::size_t used = reference_of_item_.size() % block_size_;
+        if (used != 0 && used + leaf.count > block_size_) {
+            reference_of_item_.insert(reference_of_item_.end(), block_size_ - used, kNoReference);
+        }
+        const auto first_item = static_cast<std::uint32_t>(reference_of_item_.size());
+        for (std::uint32_t i = 0; i < leaf.count; ++i) reference_of_item_.push_back(leaf.first + i);
+        return first_item;
     }
 
     const Hierarchy& hierarchy_;
     const BuildOptions& options_;
     std::uint32_t block_size_;
     double root_area_ = 1.0;
-    std::uint32_t item_count_ = 0;
-    std::vector<LeafItems> leaves_;
+    AlignedVector<std::uint32_t> reference_of_item_;
 };
 
-/// A block that nothing hits.
-TriangleBlock empty_block() {
-    TriangleBlock block;
-    std::fill_n(&block.v[0][0][0], 9 * kBlockSize, std::numeric_limits<float>::quiet_NaN());
-    std::fill_n(block.prim_id, kBlockSize, -1);
-    return block;
-}
-
-void store_triangle(TriangleBlock& block, std::uint32_t lane, MeshView mesh, std::uint32_t id) {
-    for (int corner = 0; corner < 3; ++corner) {
-        const glm::vec3& position = mesh.positions[mesh.triangles[id][corner]];
-        for (int a = 0; a < 3; ++a) block.v[corner][a][lane] = position[a];
+/// Stores the triangles of up to kBlockSize items; nothing hits the other lanes.
+void fill_block(TriangleBlock& block, std::span<const std::uint32_t> items, MeshView mesh,
+                std::span<const Reference> references) {
+    for (std::size_t lane = 0; lane < kBlockSize; ++lane) {
+        const bool is_used = lane < items.size() && items[lane] != kNoReference;
+        glm::vec3 corners[3] = {kNowhere, kNowhere, kNowhere};
+        block.prim_id[lane] = -1;
+        if (is_used) {
+            const std::uint32_t id = references[items[lane]].id;
+            for (int c = 0; c < 3; ++c) corners[c] = mesh.positions[mesh.triangles[id][c]];
+            block.prim_id[lane] = static_cast<std::int32_t>(id);
+        }
+        for (int c = 0; c < 3; ++c) {
+            for (int a = 0; a < 3; ++a) block.v[c][a][lane] = corners[c][a];
+        }
     }
-    block.prim_id[lane] = static_cast<std::int32_t>(id);
 }
 
 }  // namespace
@@ -119,20 +125,18 @@ TreeView Tree::view() const noexcept {
 
 Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
                const Parallel& parallel) {
-    constexpr std::size_t kGrain = 4096;
+    constexpr std::size_t kGrain = 512;
     Tree tree;
     Linearizer linearizer(hierarchy, options, kBlockSize);
     linearizer.run(tree);
-    tree.blocks.assign((linearizer.item_count() + kBlockSize - 1) / kBlockSize, empty_block());
-    const auto& leaves = linearizer.leaves();
+    const auto items = linearizer.references_of_items();
+    tree.blocks.resize((items.size() + kBlockSize - 1) / kBlockSize);
     parallel.run([&] {
-        parallel.for_pieces(leaves.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t l = begin; l < end; ++l) {
-                for (std::uint32_t i = 0; i < leaves[l].count; ++i) {
-                    const std::uint32_t item = leaves[l].first_item + i;
-                    store_triangle(tree.blocks[item / kBlockSize], item % kBlockSize, mesh,
-                                   hierarchy.references[leaves[l].first_reference + i].id);
-                }
+        parallel.for_pieces(tree.blocks.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b) {
+                const std::size_t first = b * kBlockSize;
+                const auto count = std::min<std::size_t>(kBlockSize, items.size() - first);
+                fill_block(tree.blocks[b], items.subspan(first, count), mesh, hierarchy.references);
             }
         });
     });

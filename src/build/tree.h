@@ -12,7 +12,7 @@ namespace packet {
 /// Owns what a TreeView shows.
 struct Tree {
     AlignedVector<Node> nodes;
-    AlignedVector<TriangleBlock> blocks;
+    ScratchVector<TriangleBlock> blocks;
     Bounds3f bounds;
     BuildStats stats;
 
