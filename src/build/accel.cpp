@@ -1,5 +1,6 @@
 // The table of structures: a new one adds a line to each of the two tables below.
 #include "build/bvh_midpoint.h"
+#include "build/bvh_morton.h"
 #include "build/bvh_sah.h"
 #include "build/tree.h"
 #include "core/macros.h"
@@ -15,6 +16,7 @@ namespace packet {
 static constexpr std::array kAccelNames = {
     AccelName{AccelKind::kBvh, "bvh"},
     AccelName{AccelKind::kBvhMidpoint, "bvh-midpoint"},
+    AccelName{AccelKind::kBvhMorton, "bvh-morton"},
 };
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
@@ -36,6 +38,8 @@ static Hierarchy build_hierarchy(AlignedVector<Reference> references, const Buil
         case AccelKind::kBvh: return build_bvh_sah(std::move(references), options, parallel);
         case AccelKind::kBvhMidpoint:
             return build_bvh_midpoint(std::move(references), options, parallel);
+        case AccelKind::kBvhMorton:
+            return build_bvh_morton(std::move(references), options, parallel);
     }
     PACKET_ASSERT(false && "an AccelKind that is not in the enumeration");
     return {};

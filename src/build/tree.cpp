@@ -162,6 +162,8 @@ void validate(const BuildOptions& options) {
           "BuildOptions::traversal_cost must be 0 to 1e6");
     check(options.intersection_cost > 0.0f && options.intersection_cost <= 1e6f,
           "BuildOptions::intersection_cost must be above 0, up to 1e6");
+    check(options.morton_bits == 0 || options.morton_bits == 30 || options.morton_bits == 63,
+          "BuildOptions::morton_bits must be 0, 30 or 63");
 }
 
 }  // namespace packet
