@@ -160,8 +160,9 @@ Hierarchy build_trivial(AlignedVector<Reference> references) {
     return out;
 }
 
-/// Up to this, 30 bits tell references apart nearly as well as 63 (SAH cost within 0.1% for evenly
-/// spread triangles up to ten times as many), and building takes a tenth to a third less time.
+/// Up to this, 30 bits do as well as 63 for evenly spread triangles (SAH cost within 0.1%, in
+/// terrain and city) and sort in half the passes. Kept well below where they differ, for uneven
+/// scenes.
 constexpr std::size_t kMostFor30Bits = 100000;
 
 }  // namespace
