@@ -1,4 +1,6 @@
 // The table of structures: a new one adds a line to each of the two tables below.
+#include "build/bvh_midpoint.h"
+#include "build/bvh_morton.h"
 #include "build/bvh_sah.h"
 #include "build/kd_tree.h"
 #include "build/tree.h"
@@ -13,8 +15,13 @@
 namespace packet {
 
 static constexpr std::array kAccelNames = {
-    AccelName{AccelKind::kBvh, "bvh"}, AccelName{AccelKind::kKdMidpoint, "kd-midpoint"},
-    AccelName{AccelKind::kKdMedian, "kd-median"}, AccelName{AccelKind::kKdSah, "kd-sah"}};
+    AccelName{AccelKind::kBvh, "bvh"},
+    AccelName{AccelKind::kBvhMidpoint, "bvh-midpoint"},
+    AccelName{AccelKind::kBvhMorton, "bvh-morton"},
+    AccelName{AccelKind::kKdMidpoint, "kd-midpoint"},
+    AccelName{AccelKind::kKdMedian, "kd-median"},
+    AccelName{AccelKind::kKdSah, "kd-sah"},
+};
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
 
@@ -39,6 +46,10 @@ static Hierarchy build_hierarchy(MeshView mesh, AlignedVector<Reference> referen
         case AccelKind::kKdMidpoint: return kd_tree(KdRule::kMidpoint);
         case AccelKind::kKdMedian: return kd_tree(KdRule::kMedian);
         case AccelKind::kKdSah: return kd_tree(KdRule::kSah);
+        case AccelKind::kBvhMidpoint:
+            return build_bvh_midpoint(std::move(references), options, parallel);
+        case AccelKind::kBvhMorton:
+            return build_bvh_morton(std::move(references), options, parallel);
     }
     PACKET_ASSERT(false && "an AccelKind that is not in the enumeration");
     return {};

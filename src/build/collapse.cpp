@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <vector>
 
 namespace packet {
 
@@ -138,11 +139,12 @@ private:
 
     /// Gives the items of a wide leaf their places and returns the first.
     std::uint32_t place_items(std::uint32_t id) {
-        const std::uint32_t used = out_.item_count % block_size_;
-        if (used + costs_[id].items > block_size_ && used != 0) {
-            out_.item_count += block_size_ - used;
+        auto& items = out_.reference_of_item;
+        const std::size_t used = items.size() % block_size_;
+        if (used != 0 && used + costs_[id].items > block_size_) {
+            items.insert(items.end(), block_size_ - used, kNoReference);
         }
-        const std::uint32_t first = out_.item_count;
+        const auto first = static_cast<std::uint32_t>(items.size());
         place_leaves(id);
         return first;
     }
@@ -154,9 +156,11 @@ private:
             place_leaves(node.link);
             return;
         }
-        out_.places.push_back({node.link, node.count, out_.item_count});
-        node.link = out_.item_count;
-        out_.item_count += node.count;
+        const std::uint32_t first_reference = node.link;
+        node.link = static_cast<std::uint32_t>(out_.reference_of_item.size());
+        for (std::uint32_t i = 0; i < node.count; ++i) {
+            out_.reference_of_item.push_back(first_reference + i);
+        }
     }
 
     /// Children that are not there have boxes that no ray meets.

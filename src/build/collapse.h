@@ -3,19 +3,16 @@
 
 #include "build/tree.h"
 
-#include <vector>
+#include <span>
 
 namespace packet {
 
-/// Where the references of a leaf of the binary tree go: items `first_item` and on.
-struct LeafPlace {
-    std::uint32_t first_reference, count, first_item;
-};
+/// An item that only fills a block up, so that a leaf starts the next.
+inline constexpr std::uint32_t kNoReference = 0xFFFFFFFF;
 
 struct Collapsed {
     AlignedVector<WideNode> nodes;
-    std::vector<LeafPlace> places;  ///< in depth-first order of the leaves
-    std::uint32_t item_count = 0;   ///< gaps included
+    ScratchVector<std::uint32_t> reference_of_item;
 };
 
 /// Joins nodes into wide ones, and leaves into wide leaves of up to `block_size` items, so that the

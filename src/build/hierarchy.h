@@ -5,7 +5,6 @@
 #include "build/references.h"
 
 #include <cstdint>
-#include <vector>
 
 namespace packet {
 
@@ -20,7 +19,7 @@ struct BuildNode {
 };
 
 struct Hierarchy {
-    std::vector<BuildNode> nodes;  ///< nodes[0] is the root; unused slots are never referred to
+    ScratchVector<BuildNode> nodes;  ///< nodes[0] is the root; unused slots are never referred to
     AlignedVector<Reference> references;
 };
 

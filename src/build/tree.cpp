@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 namespace packet {
 
 namespace {
+
+constexpr glm::vec3 kNowhere(std::numeric_limits<float>::quiet_NaN());
 
 Node make_node(const BuildNode& source) {
     Node node = {};
@@ -77,20 +80,22 @@ std::size_t byte_count(const Tree& tree) {
            tree.blocks.size() * sizeof(TriangleBlock);
 }
 
-/// A block that nothing hits.
-TriangleBlock empty_block() {
-    TriangleBlock block;
-    std::fill_n(&block.v[0][0][0], 9 * kBlockSize, std::numeric_limits<float>::quiet_NaN());
-    std::fill_n(block.prim_id, kBlockSize, -1);
-    return block;
-}
-
-void store_triangle(TriangleBlock& block, std::uint32_t lane, MeshView mesh, std::uint32_t id) {
-    for (int corner = 0; corner < 3; ++corner) {
-        const glm::vec3& position = mesh.positions[mesh.triangles[id][corner]];
-        for (int a = 0; a < 3; ++a) block.v[corner][a][lane] = position[a];
+/// Stores the triangles of up to kBlockSize items; nothing hits the other lanes.
+void fill_block(TriangleBlock& block, std::span<const std::uint32_t> items, MeshView mesh,
+                std::span<const Reference> references) {
+    for (std::size_t lane = 0; lane < kBlockSize; ++lane) {
+        const bool is_used = lane < items.size() && items[lane] != kNoReference;
+        glm::vec3 corners[3] = {kNowhere, kNowhere, kNowhere};
+        block.prim_id[lane] = -1;
+        if (is_used) {
+            const std::uint32_t id = references[items[lane]].id;
+            for (int c = 0; c < 3; ++c) corners[c] = mesh.positions[mesh.triangles[id][c]];
+            block.prim_id[lane] = static_cast<std::int32_t>(id);
+        }
+        for (int c = 0; c < 3; ++c) {
+            for (int a = 0; a < 3; ++a) block.v[c][a][lane] = corners[c][a];
+        }
     }
-    block.prim_id[lane] = static_cast<std::int32_t>(id);
 }
 
 }  // namespace
@@ -110,19 +115,17 @@ TreeView Tree::view() const noexcept {
 
 Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
                const Parallel& parallel) {
-    constexpr std::size_t kGrain = 4096;
+    constexpr std::size_t kGrain = 512;
     Tree tree;
     const Collapsed collapsed = make_nodes(hierarchy, options, kBlockSize, tree);
-    tree.blocks.assign((collapsed.item_count + kBlockSize - 1) / kBlockSize, empty_block());
-    const auto& places = collapsed.places;
+    const std::span<const std::uint32_t> items = collapsed.reference_of_item;
+    tree.blocks.resize((items.size() + kBlockSize - 1) / kBlockSize);
     parallel.run([&] {
-        parallel.for_pieces(places.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t l = begin; l < end; ++l) {
-                for (std::uint32_t i = 0; i < places[l].count; ++i) {
-                    const std::uint32_t item = places[l].first_item + i;
-                    store_triangle(tree.blocks[item / kBlockSize], item % kBlockSize, mesh,
-                                   hierarchy.references[places[l].first_reference + i].id);
-                }
+        parallel.for_pieces(tree.blocks.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b) {
+                const std::size_t first = b * kBlockSize;
+                const auto count = std::min<std::size_t>(kBlockSize, items.size() - first);
+                fill_block(tree.blocks[b], items.subspan(first, count), mesh, hierarchy.references);
             }
         });
     });
@@ -149,6 +152,8 @@ void validate(const BuildOptions& options) {
           "BuildOptions::intersection_cost must be above 0, up to 1e6");
     check(options.max_reference_factor >= 1.0f && options.max_reference_factor <= 64.0f,
           "BuildOptions::max_reference_factor must be 1 to 64");
+    check(options.morton_bits == 0 || options.morton_bits == 30 || options.morton_bits == 63,
+          "BuildOptions::morton_bits must be 0, 30 or 63");
 }
 
 }  // namespace packet

@@ -13,7 +13,7 @@ namespace packet {
 struct Tree {
     AlignedVector<Node> nodes;
     AlignedVector<WideNode> wide_nodes;
-    AlignedVector<TriangleBlock> blocks;
+    ScratchVector<TriangleBlock> blocks;
     Bounds3f bounds;
     BuildStats stats;
 

@@ -4,6 +4,7 @@
 #include <packet/error.h>
 #include <packet/mesh.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -49,7 +50,7 @@ TriangleFault find_fault(const glm::vec3& v0, const glm::vec3& v1, const glm::ve
     for (const glm::vec3& v : {v0, v1, v2}) {
         for (int i = 0; i < 3; ++i) {
             if (!std::isfinite(v[i])) return TriangleFault::kNonFinite;
-            largest = std::fmax(largest, std::fabs(v[i]));
+            largest = std::max(largest, std::fabs(v[i]));
         }
     }
     if (largest > kMaxCoordinate) return TriangleFault::kTooLarge;

@@ -1,0 +1,97 @@
+// The binary radix tree over sorted Morton codes: each node covers a range of them, and splits it
+// where the highest bit in which its first and last differ turns from 0 to 1. Each node finds its
+// range by itself, from the codes around it.
+//
+// Karras. Maximizing parallelism in the construction of BVHs, octrees, and k-d trees. HPG 2012.
+#pragma once
+
+#include "core/views.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace packet {
+
+/// A Morton code and the index of what it belongs to.
+template <class Code>
+struct MortonItem {
+    Code code;
+    std::uint32_t index;
+};
+
+/// What an inner node covers: items `first` to `last`, those up to `split` by the first child. A
+/// child with one item is that leaf; else it is inner node `split` or `split + 1`.
+struct RadixNode {
+    std::uint32_t first, last, split;
+
+    friend bool operator==(const RadixNode&, const RadixNode&) = default;
+};
+
+/// Sorted codes, made distinct: equal ones are told apart by the bits of their position. The low
+/// `dropped_bits` of the codes are taken as equal.
+template <class Code>
+class RadixKeys {
+public:
+    explicit RadixKeys(std::span<const MortonItem<Code>> sorted, int dropped_bits = 0)
+        : sorted_(sorted), dropped_bits_(dropped_bits) {}
+
+    [[nodiscard]] std::size_t size() const noexcept { return sorted_.size(); }
+
+    /// How many leading bits keys i and j have in common; -1 if there is no j.
+    [[nodiscard]] int common_bits(std::int64_t i, std::int64_t j) const noexcept {
+        if (j < 0 || j >= static_cast<std::int64_t>(size())) return -1;
+        const Code difference = (code(i) ^ code(j)) >> dropped_bits_;
+        if (difference != 0) return std::countl_zero(difference);
+        return kCodeBits + std::countl_zero(static_cast<std::uint32_t>(i ^ j));
+    }
+
+private:
+    static constexpr int kCodeBits = 8 * sizeof(Code);
+
+    [[nodiscard]] Code code(std::int64_t i) const noexcept {
+        return sorted_[static_cast<std::size_t>(i)].code;
+    }
+
+    std::span<const MortonItem<Code>> sorted_;
+    int dropped_bits_;
+};
+
+/// How many low bits of `code_bits` to drop so that the tree over n codes is no deeper than
+/// kMaxDepth whatever they are. Each edge on the way down goes to a lower bit of the key, and the
+/// key then has at most kMaxDepth that are not the same for all: those of the code, and the
+/// bit_width(n - 1) of a position.
+[[nodiscard]] constexpr int dropped_bits_for_depth(int code_bits, std::size_t n) noexcept {
+    return std::max(0, code_bits + static_cast<int>(std::bit_width(n - 1)) - kMaxDepth);
+}
+
+/// Inner node i of the n - 1 over n keys; node 0 is the root, over all. O(log n).
+template <class Code>
+[[nodiscard]] RadixNode radix_node(const RadixKeys<Code>& keys, std::uint32_t index) noexcept {
+    const std::int64_t i = index;
+    // The range extends from i to the side whose neighbour has more in common with it.
+    const std::int64_t d = keys.common_bits(i, i + 1) > keys.common_bits(i, i - 1) ? 1 : -1;
+    // What lies within has more bits in common with i than the other neighbour has.
+    const int outside = keys.common_bits(i, i - d);
+    std::int64_t most = 2;
+    while (keys.common_bits(i, i + most * d) > outside) most *= 2;
+    std::int64_t length = 0;
+    for (std::int64_t step = most / 2; step > 0; step /= 2) {
+        if (keys.common_bits(i, i + (length + step) * d) > outside) length += step;
+    }
+    const std::int64_t end = i + length * d;
+    // The last one that has more in common with i than the end has is next to the split.
+    const int within = keys.common_bits(i, end);
+    std::int64_t same = 0;
+    for (std::int64_t step = std::bit_ceil(static_cast<std::uint64_t>(length)) / 2; step > 0;
+         step /= 2) {
+        if (keys.common_bits(i, i + (same + step) * d) > within) same += step;
+    }
+    const std::int64_t split = i + same * d + std::min<std::int64_t>(d, 0);
+    return {static_cast<std::uint32_t>(std::min(i, end)),
+            static_cast<std::uint32_t>(std::max(i, end)), static_cast<std::uint32_t>(split)};
+}
+
+}  // namespace packet
