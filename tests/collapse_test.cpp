@@ -86,6 +86,6 @@ TEST_CASE("wide nodes are well filled and their leaves share blocks") {
     Walked out;
     out.seen.assign(tree.blocks.size() * kBlockSize, 0);
     walk(tree, 0, 0, out);
-    CHECK(out.children > 5 * static_cast<int>(out.nodes));
+    CHECK(out.children > 4 * static_cast<int>(out.nodes));
     CHECK(tree.blocks.size() * kBlockSize < 2 * 50000);
 }

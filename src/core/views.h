@@ -66,7 +66,7 @@ struct TreeView {
 struct InstanceView {
     float object_from_world[3][4];  ///< rows; the last column is the translation
     std::uint32_t instance_id;
-    TreeView tree;
+    const TreeView* tree;
 };
 
 /// What the world consists of: instances, under a tree whose leaves hold them.

@@ -79,7 +79,7 @@ PACKET_INLINE void meet_instances(const SceneView& scene, const RayLanes<N, Isa>
     best.t = select(active, best.t, Float<N, Isa>(kNever));
     for (std::uint32_t i = first; i < first + item_count; ++i) {
         const InstanceView& instance = scene.instances[i];
-        walk_mesh<query>(instance.tree, to_object(instance, ray),
+        walk_mesh<query>(*instance.tree, to_object(instance, ray),
                          static_cast<std::int32_t>(instance.instance_id), best, stats);
     }
     best.t = select(active, best.t, kept);
@@ -90,7 +90,7 @@ PACKET_INLINE void walk_scene(const SceneView& scene, const RayLanes<N, Isa>& ra
                               BestHits<N, Isa>& best, Stats& stats) {
     if (scene.is_single_mesh) {
         const InstanceView& only = scene.instances[0];
-        walk_mesh<query>(only.tree, ray, static_cast<std::int32_t>(only.instance_id), best, stats);
+        walk_mesh<query>(*only.tree, ray, static_cast<std::int32_t>(only.instance_id), best, stats);
         return;
     }
     if (scene.top.node_count == 0) return;

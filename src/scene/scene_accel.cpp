@@ -34,6 +34,7 @@ void build_trees(std::span<const TriangleMesh> meshes, const BuildOptions& optio
         most_triangles = meshes[i].triangles.size();
         out.stats.sah_cost = out.trees.back().stats.sah_cost;
     }
+    for (const Tree& tree : out.trees) out.tree_views.push_back(tree.view());
 }
 
 /// What rounding in the transform of a ray comes to, for the worst instance: ray and inverse are
@@ -61,6 +62,7 @@ struct TransformError {
     }
 };
 
+/// The tree over the instances that show anything. The meshes' trees are built.
 void build_top(std::span<const Instance> instances, const BuildOptions& options, SceneAccel& out) {
     AlignedVector<Reference> references;
     std::vector<InstanceView> views(instances.size());
@@ -73,7 +75,7 @@ void build_top(std::span<const Instance> instances, const BuildOptions& options,
         const ObjectFromWorld inverse = invert(instance.world_from_object, what.c_str());
         std::copy_n(&inverse.row[0][0], 12, &views[i].object_from_world[0][0]);
         views[i].instance_id = id;
-        views[i].tree = tree.view();
+        views[i].tree = &out.tree_views[instance.mesh_id];
         out.mesh_of_instance.push_back(instance.mesh_id);
         const Bounds3f box = transform(instance.world_from_object, tree.bounds);
         if (box.empty()) continue;

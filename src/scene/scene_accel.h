@@ -11,7 +11,8 @@
 namespace packet {
 
 struct SceneAccel {
-    std::vector<Tree> trees;  ///< by mesh_id
+    std::vector<Tree> trees;           ///< by mesh_id
+    std::vector<TreeView> tree_views;  ///< by mesh_id
     Tree top;
     std::vector<InstanceView> instances;          ///< in the order of the top tree's leaves
     std::vector<std::uint32_t> mesh_of_instance;  ///< by instance_id
