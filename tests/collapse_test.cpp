@@ -1,5 +1,5 @@
-// The 8-wide form: every item reachable once, in boxes that contain its leaf, and never costlier than
-// joining nothing.
+// The 8-wide form: every item reachable once, in boxes that contain its leaf, and never costlier
+// than joining nothing.
 #include "generate.h"
 
 #include "build/tree.h"

@@ -354,9 +354,9 @@ TEST_CASE("rays that graze large triangles, pinned to their hits") {
     }
 }
 
-// For such a ray barycentric coordinates rounded in float put t far from where ray and triangle meet,
-// up to 2.6e5 times the growth of boxes. The box of the part that the ray meets would be entered after
-// t, and a hit, or the ray's end, in between would make the walk stop early.
+// For such a ray barycentric coordinates rounded in float put t far from where ray and triangle
+// meet, up to 2.6e5 times the growth of boxes. The box of the part that the ray meets would be
+// entered after t, and a hit, or the ray's end, in between would make the walk stop early.
 TEST_CASE("rays that all but lie in a large triangle's plane, among dust") {
     for (const std::uint64_t seed : {3, 4, 5, 6}) {
         tools::Random random(seed);

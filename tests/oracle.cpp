@@ -80,7 +80,8 @@ struct Meeting {
     float t, u, v;
 };
 
-Meeting meet_in_double(const float (&x)[3], const float (&y)[3], const float (&depth)[3], float sz) {
+Meeting meet_in_double(const float (&x)[3], const float (&y)[3], const float (&depth)[3],
+                       float sz) {
     const auto edge = [&](int a, int b) {
         return static_cast<double>(x[a]) * static_cast<double>(y[b]) -
                static_cast<double>(y[a]) * static_cast<double>(x[b]);

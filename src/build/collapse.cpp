@@ -51,7 +51,8 @@ private:
         return x * y + y * z + z * x;
     }
 
-    /// Cheapest way to show an inner node's children as `roots` trees, and how many go to the first.
+    /// Cheapest way to show an inner node's children as `roots` trees, and how many go to the
+    /// first.
     struct Cut {
         float cost = std::numeric_limits<float>::infinity();
         int first = 1;
@@ -78,8 +79,8 @@ private:
             return;
         }
         cost.items = costs_[id + 1].items + costs_[second(id)].items;
-        cost.leaf = cost.items <= block_size_ ? area * kBlockCost
-                                              : std::numeric_limits<float>::infinity();
+        cost.leaf =
+            cost.items <= block_size_ ? area * kBlockCost : std::numeric_limits<float>::infinity();
         cost.split_in_8 = best_cut(id, kWideSize).cost;
         cost.forest[0] = std::min(cost.leaf, area * kNodeCost + cost.split_in_8);
         for (int roots = 2; roots <= Cost::kMostRoots; ++roots) {

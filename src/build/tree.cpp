@@ -25,8 +25,8 @@ Node make_node(const BuildNode& source) {
     return node;
 }
 
-/// Adds a node to the statistics: its cost counts as often as a random ray that meets the root's box
-/// meets its own.
+/// Adds a node to the statistics: its cost counts as often as a random ray that meets the root's
+/// box meets its own.
 void count_node(const BuildNode& node, int depth, double root_area, const BuildOptions& options,
                 BuildStats& stats) {
     const double share = static_cast<double>(node.bounds.half_area()) / root_area;
@@ -45,8 +45,8 @@ void linearize(const Hierarchy& hierarchy, const BuildOptions& options, Tree& tr
         int depth;
     };
     constexpr std::uint32_t kNoParent = 0xFFFFFFFF;
-    const double root_area = std::max(static_cast<double>(tree.bounds.half_area()),
-                                      std::numeric_limits<double>::min());
+    const double root_area =
+        std::max(static_cast<double>(tree.bounds.half_area()), std::numeric_limits<double>::min());
     std::vector<Pending> stack = {{0, kNoParent, 0}};
     while (!stack.empty()) {
         const Pending p = stack.back();

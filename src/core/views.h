@@ -31,8 +31,8 @@ static_assert(sizeof(Node) == 32 && std::is_trivially_copyable_v<Node>);
 /// Children of a wide node.
 inline constexpr int kWideSize = 8;
 
-/// A node of the 8-wide form of a tree. Its children's boxes are a structure of arrays. Children that
-/// are not there have a box that nothing meets: lower +inf, upper -inf.
+/// A node of the 8-wide form of a tree. Its children's boxes are a structure of arrays. Children
+/// that are not there have a box that nothing meets: lower +inf, upper -inf.
 struct alignas(64) WideNode {
     float plane[2][3][kWideSize];    ///< [lower, upper][axis][child]
     std::uint32_t link[kWideSize];   ///< inner: index of the child's node; leaf: its first item

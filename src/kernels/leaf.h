@@ -36,8 +36,8 @@ PACKET_INLINE int nearest_lane(std::uint32_t bits, const float (&t)[N],
     return nearest;
 }
 
-/// A single ray, in all lanes, meets the blocks that hold triangles `first` to `first + count`. Other
-/// leaves' triangles in the same block are met along: they are triangles like any other.
+/// A single ray, in all lanes, meets the blocks that hold triangles `first` to `first + count`.
+/// Other leaves' triangles in the same block are met along: they are triangles like any other.
 template <Query query, class Isa>
 PACKET_INLINE void meet_blocks(const TreeView& tree, const PreparedRays<kBlockSize, Isa>& ray,
                                std::uint32_t first, std::uint32_t count, std::int32_t instance_id,
@@ -53,8 +53,8 @@ PACKET_INLINE void meet_blocks(const TreeView& tree, const PreparedRays<kBlockSi
         float t[kBlockSize], u[kBlockSize], v[kBlockSize];
         hits.t.store(t), hits.u.store(u), hits.v.store(v);
         const int i = nearest_lane(bits, t, block.prim_id);
-        best.template update<query>(Mask<1, Isa>::from_bits(1), t[i], u[i], v[i],
-                                    block.prim_id[i], instance_id);
+        best.template update<query>(Mask<1, Isa>::from_bits(1), t[i], u[i], v[i], block.prim_id[i],
+                                    instance_id);
         if (query == Query::kAny) return;
     }
 }

@@ -34,9 +34,9 @@ struct PreparedRays {
 
     F org[3];  ///< kShared: axes in the order `axis`, else x y z
     F shear_x, shear_y, scale_z;
-    M z_is_x, z_is_y;         ///< kMixed: which axis is longest
-    int axis[3] = {0, 1, 2};  ///< kShared: the axes that become x, y, z
-    int near_side[3] = {};    ///< kShared: per axis, the plane of a node that is met first
+    M z_is_x, z_is_y;           ///< kMixed: which axis is longest
+    int axis[3] = {0, 1, 2};    ///< kShared: the axes that become x, y, z
+    int near_side[3] = {};      ///< kShared: per axis, the plane of a node that is met first
     F org_near[3], org_far[3];  ///< kShared: what meets the near and the far planes
     Directions directions = Directions::kMixed;
 };

@@ -21,7 +21,8 @@ PACKET_INLINE void walk_mesh_directed(const TreeView& tree, const PreparedRays<N
                           });
 }
 
-/// The lanes of `ray` that are usable in the mesh's space and still look for something meet the mesh.
+/// The lanes of `ray` that are usable in the mesh's space and still look for something meet the
+/// mesh.
 template <Query query, int N, class Isa, class Stats>
 [[gnu::noinline]] void walk_mesh(const TreeView& tree, const RayLanes<N, Isa>& ray,
                                  std::int32_t instance_id, BestHits<N, Isa>& best, Stats& stats) {
@@ -32,13 +33,13 @@ template <Query query, int N, class Isa, class Stats>
     if (none(active)) return;
     best.enter_instance(instance_id);
     if constexpr (N == 1) {
-        const PreparedRays<kWideSize, Isa> prepared = prepare(tree, broadcast<kWideSize>(ray), 0xFF);
-        walk_wide_tree<query>(tree, prepared, best.t.r[0], stats,
-                              [&](std::uint32_t first, std::uint32_t item_count) {
-                                  stats.triangles(static_cast<int>(item_count));
-                                  meet_blocks<query>(tree, prepared, first, item_count,
-                                                     instance_id, best);
-                              });
+        const PreparedRays<kWideSize, Isa> prepared =
+            prepare(tree, broadcast<kWideSize>(ray), 0xFF);
+        walk_wide_tree<query>(
+            tree, prepared, best.t.r[0], stats, [&](std::uint32_t first, std::uint32_t item_count) {
+                stats.triangles(static_cast<int>(item_count));
+                meet_blocks<query>(tree, prepared, first, item_count, instance_id, best);
+            });
     } else {
         const PreparedRays<N, Isa> prepared = prepare(tree, ray, active.bits());
         const F kept = best.t;

@@ -1,5 +1,6 @@
-// Walks the 8-wide form of a tree with one ray: it meets 8 boxes at once, and what it meets goes onto
-// the stack in order of entry. Any-hit takes the children as they come, since the first hit ends it.
+// Walks the 8-wide form of a tree with one ray: it meets 8 boxes at once, and what it meets goes
+// onto the stack in order of entry. Any-hit takes the children as they come, since the first hit
+// ends it.
 //
 // Wald, Benthin, Boulos. Getting rid of packets. Interactive Ray Tracing 2008.
 // Afra, Szirmay-Kalos. Stackless multi-BVH traversal for CPU, MIC and GPU ray tracing. CGF 2014.
@@ -84,7 +85,8 @@ PACKET_INLINE void walk_wide_tree(const TreeView& tree, const PreparedRays<kWide
         const WideNode& node = tree.wide_nodes[node_id];
         stats.visit(1, 1);
         const Interval<kWideSize, Isa> boxes = wide.slabs(node);
-        // if (max(enter, tnear) > min(exit, best_t)) the ray misses; equal must pass, for the tie rule
+        // if (max(enter, tnear) > min(exit, best_t)) the ray misses; equal must pass, for the tie
+        // rule
         const std::uint32_t bits =
             (max(boxes.enter, wide.tnear) <= min(boxes.exit, F(best_t))).bits();
         if (bits != 0) {

@@ -60,11 +60,11 @@ template <int N, class Isa>
     edges = {Float<N, Isa>::load(u), Float<N, Isa>::load(v), Float<N, Isa>::load(w)};
 }
 
-/// Barycentric coordinates from edge functions in float are off by about 2^-24 |x| |y| / |det|, where x
-/// and y are the largest of the sheared corners. Beyond this condition, as where a ray all but lies in
-/// the triangle's plane, t would not be where the two meet, and a cell that holds a part of the
-/// triangle might be skipped: then it is computed in double. (Up to it the error stays within the
-/// slack of boxes.) Decided from floats that are the same on every ISA.
+/// Barycentric coordinates from edge functions in float are off by about 2^-24 |x| |y| / |det|,
+/// where x and y are the largest of the sheared corners. Beyond this condition, as where a ray all
+/// but lies in the triangle's plane, t would not be where the two meet, and a cell that holds a
+/// part of the triangle might be skipped: then it is computed in double. (Up to it the error stays
+/// within the slack of boxes.) Decided from floats that are the same on every ISA.
 inline constexpr float kWorstCondition = 2.0f;
 
 template <int N, class Isa>

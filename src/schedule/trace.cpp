@@ -79,7 +79,9 @@ public:
     using Kernels = KernelTable::Batch[KernelTable::kWidthCount][KernelTable::kCountingCount];
 
     SpanTrace(const Scene& scene, std::span<const Ray> rays, const TraceOptions& options)
-        : scene_(scene.accel()), tasks_(rays, options.width), options_(options),
+        : scene_(scene.accel()),
+          tasks_(rays, options.width),
+          options_(options),
           parallel_(options.threads) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
