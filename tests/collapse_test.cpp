@@ -64,7 +64,7 @@ void walk(const Tree& tree, std::uint32_t id, int depth, Walked& out) {
 
 TEST_CASE("the 8-wide form holds every triangle once, in boxes that contain it") {
     for (const tools::SceneKind& kind : tools::kSceneKinds) {
-        for (const std::size_t count : {1, 2, 9, 1000, 30000}) {
+        for (const std::size_t count : {1u, 2u, 9u, 1000u, 30000u}) {
             CAPTURE(kind.name);
             CAPTURE(count);
             const Tree tree = build_tree(kind.make(count, 1).view(), {});

@@ -227,7 +227,7 @@ TEST_CASE("the reference cap holds, is used, and leaves every triangle in the tr
     }
     BuildOptions options;
     options.max_reference_factor = 0.5f;
-    CHECK_THROWS_WITH_AS(build_tree(mesh.view(), options),
+    CHECK_THROWS_WITH_AS((void)build_tree(mesh.view(), options),
                          "BuildOptions::max_reference_factor must be 1 to 64", Error);
 }
 
@@ -323,7 +323,7 @@ TEST_CASE("triangles that lie in the planes of cells, with rays in and along the
 }
 
 TEST_CASE("rays that graze large triangles, pinned to their hits") {
-    for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
         tools::Random random(seed);
         TriangleMesh mesh;
         for (int i = 0; i < 40; ++i) {
@@ -358,7 +358,7 @@ TEST_CASE("rays that graze large triangles, pinned to their hits") {
 // meet, up to 2.6e5 times the growth of boxes. The box of the part that the ray meets would be
 // entered after t, and a hit, or the ray's end, in between would make the walk stop early.
 TEST_CASE("rays that all but lie in a large triangle's plane, among dust") {
-    for (const std::uint64_t seed : {3, 4, 5, 6}) {
+    for (const std::uint64_t seed : {3u, 4u, 5u, 6u}) {
         tools::Random random(seed);
         TriangleMesh mesh;
         const glm::vec3 p = 2.0f * random.point() - 0.5f;
