@@ -134,6 +134,38 @@ TEST_CASE("rays in scanline order give the same hits in the same places with any
     }
 }
 
+TEST_CASE(
+    "auto gives the hits of single rays, each once, where it tries modes on part of the rays") {
+    Scene scene = make_scene(tools::make_city(3000, 1));
+    scene.commit();
+    const auto rays = random_rays(scene.bounds(), 160001, 6);  // over 128 tasks, in runs and tiles
+    std::vector<Hit> want(rays.size()), hits(rays.size());
+    TraceOptions options;
+    options.mode = Mode::kSingle;
+    trace_closest(scene, rays, want, options);
+    options.mode = Mode::kAuto;
+    for (const int threads : {1, 2}) {
+        for (const int width : {0, 401}) {
+            options.threads = threads;
+            options.width = width;
+            TraceStats stats;
+            options.stats = &stats;
+            std::fill(hits.begin(), hits.end(), Hit{});
+            trace_closest(scene, rays, hits, options);
+            CHECK(hits == want);
+            CHECK(stats.rays == rays.size());
+            options.stats = nullptr;
+            std::vector<std::uint8_t> occluded(rays.size(), 9);
+            trace_any(scene, rays, occluded, options);
+            std::size_t different = 0;
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+                different += occluded[i] != want[i].is_hit();
+            }
+            CHECK(different == 0);
+        }
+    }
+}
+
 TEST_CASE("an image traced by tiles visits every pixel once and gives the hits of its rays") {
     Scene scene = make_scene(tools::make_sphere(1000));
     scene.commit();
