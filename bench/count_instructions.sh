@@ -20,7 +20,7 @@ count() {  # ISA, flags
             mixed = /Directions\)1/ ? "mixed" : "shared"
             lanes = /, 16, / ? 16 : 8
             name = ""
-            if (match($0, /::(visit_node|rays_meet_triangle|ray_meets_block)/))
+            if (match($0, /::(visit_node|rays_meet_triangle|rays_hit_triangle|ray_meets_block)/))
                 name = sprintf("%-8s%-20s%-8s%4d", isa, substr($0, RSTART + 2, RLENGTH - 2), mixed,
                                lanes)
             next

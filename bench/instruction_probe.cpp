@@ -11,24 +11,32 @@ struct Probe {
                                              const Float<N, Isa>& best_t, Float<N, Isa>& enter) {
         enter = entry<directions>(ray, node, best_t);
     }
-    [[gnu::noinline]] static void rays_meet_triangle(const PreparedRays<N, Isa>& ray,
-                                                     const TriangleBlock& block, int lane,
-                                                     const Float<N, Isa>& best_t,
-                                                     TriangleHits<N, Isa>& out) {
-        out = test_triangles<directions>(ray, best_t, [&](int corner, int axis) {
-            return Float<N, Isa>(block.v[corner][axis][lane]);
-        });
+    [[gnu::noinline]] static std::uint32_t rays_meet_triangle(const ShearRays<N, Isa>& ray,
+                                                              const TriangleBlock& block,
+                                                              int lane) {
+        return may_hit<directions>(ray, SameTriangle{block, lane}).bits();
     }
-    [[gnu::noinline]] static void ray_meets_block(const PreparedRays<N, Isa>& ray,
-                                                  const TriangleBlock& block,
-                                                  const Float<N, Isa>& best_t,
-                                                  TriangleHits<N, Isa>& out) {
-        out = test_triangles<directions>(ray, best_t, [&](int corner, int axis) {
-            return Float<N, Isa>::load(block.v[corner][axis]);
-        });
+    [[gnu::noinline]] static void rays_hit_triangle(const PreparedRays<N, Isa>& ray,
+                                                    const TriangleBlock& block, int lane,
+                                                    const Float<N, Isa>& best_t,
+                                                    std::uint32_t candidates,
+                                                    TriangleHits<N, Isa>& out) {
+        out = decide_hits<directions>(ray, best_t, Mask<N, Isa>::from_bits(candidates),
+                                      SameTriangle{block, lane});
     }
 };
 
+template <class Isa>
+struct SingleProbe {
+    [[gnu::noinline]] static std::uint32_t ray_meets_block(const SingleRay& ray,
+                                                           const TriangleBlock& block) {
+        ShearRays<kBlockSize, Isa> shear;
+        ray.broadcast(shear);
+        return may_hit<Directions::kShared>(shear, BlockTriangles{block}).bits();
+    }
+};
+
+template struct SingleProbe<isa::ISA>;
 template struct Probe<Directions::kShared, 8, isa::ISA>;
 template struct Probe<Directions::kMixed, 8, isa::ISA>;
 template struct Probe<Directions::kShared, 16, isa::ISA>;

@@ -45,18 +45,18 @@ void walk(const Tree& tree, std::uint32_t id, int depth, Walked& out) {
             continue;
         }
         ++out.children;
-        if (node.count[child] == 0) {
-            CHECK(node.link[child] > id);
-            walk(tree, node.link[child], depth + 1, out);
+        if (node.child[child].count == 0) {
+            CHECK(node.child[child].link > id);
+            walk(tree, node.child[child].link, depth + 1, out);
             continue;
         }
-        for (std::uint32_t i = 0; i < node.count[child]; ++i) {
-            ++out.seen.at(node.link[child] + i);
-            check_box(tree, node, child, node.link[child] + i);
+        for (std::uint32_t i = 0; i < node.child[child].count; ++i) {
+            ++out.seen.at(node.child[child].link + i);
+            check_box(tree, node, child, node.child[child].link + i);
         }
-        const bool one_block = node.link[child] / kBlockSize ==
-                               (node.link[child] + node.count[child] - 1) / kBlockSize;
-        CHECK((one_block || node.count[child] > kBlockSize));
+        const bool one_block = node.child[child].link / kBlockSize ==
+                               (node.child[child].link + node.child[child].count - 1) / kBlockSize;
+        CHECK((one_block || node.child[child].count > kBlockSize));
     }
 }
 

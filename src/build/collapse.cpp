@@ -132,8 +132,7 @@ private:
                 node.plane[0][a][i] = nodes_[child].plane[0][a];
                 node.plane[1][a][i] = nodes_[child].plane[1][a];
             }
-            node.link[i] = link;
-            node.count[i] = leaf ? costs_[child].items : 0;
+            node.child[i] = {link, leaf ? costs_[child].items : 0};
         }
         return index;
     }
@@ -164,11 +163,11 @@ private:
         }
     }
 
-    /// Children that are not there have boxes that no ray meets.
     static WideNode empty_node() {
         WideNode node = {};
         std::fill_n(&node.plane[0][0][0], 3 * kWideSize, std::numeric_limits<float>::infinity());
         std::fill_n(&node.plane[1][0][0], 3 * kWideSize, -std::numeric_limits<float>::infinity());
+        std::fill_n(node.child, kWideSize, WideChild{0, 1});
         return node;
     }
 

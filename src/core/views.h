@@ -31,12 +31,21 @@ static_assert(sizeof(Node) == 32 && std::is_trivially_copyable_v<Node>);
 /// Children of a wide node.
 inline constexpr int kWideSize = 8;
 
+/// What a child of a wide node is.
+struct WideChild {
+    std::uint32_t link;   ///< inner: index of its node; leaf: its first item
+    std::uint32_t count;  ///< inner: 0; leaf: how many items
+
+    [[nodiscard]] bool is_leaf() const noexcept { return count != 0; }
+};
+
 /// A node of the 8-wide form of a tree. Its children's boxes are a structure of arrays. Children
-/// that are not there have a box that nothing meets: lower +inf, upper -inf.
+/// that are not there come last and have a box that nothing meets: lower +inf, upper -inf. A ray
+/// whose numbers overflow may enter it still: they are a leaf of the first item, which any ray may
+/// meet.
 struct alignas(64) WideNode {
-    float plane[2][3][kWideSize];    ///< [lower, upper][axis][child]
-    std::uint32_t link[kWideSize];   ///< inner: index of the child's node; leaf: its first item
-    std::uint32_t count[kWideSize];  ///< inner: 0; leaf: how many items
+    float plane[2][3][kWideSize];  ///< [lower, upper][axis][child]
+    WideChild child[kWideSize];
 };
 static_assert(sizeof(WideNode) == 256 && std::is_trivially_copyable_v<WideNode>);
 

@@ -1,13 +1,12 @@
 // The nearest hits so far, one a lane, and the rule that makes them unique.
 #pragma once
 
-#include "kernels/lanes.h"
+#include "kernels/ray_setup.h"
 
 namespace packet {
 
 enum class Query { kClosest, kAny };
 
-inline constexpr float kLargestFloat = 3.402823466e38f;
 inline constexpr float kNever = -__builtin_huge_valf();
 inline constexpr std::int32_t kNoId = 0x7FFFFFFF;  // greater than any id, so any id wins a tie
 

@@ -1,7 +1,9 @@
-// The slab test: where rays enter and leave a box. It is the same arithmetic for nodes of every
-// tree and for the boxes of triangles, and each step of it rounds monotonically. So a box that
-// contains another is entered no later and left no earlier, to the last bit, and skipping it loses
-// nothing.
+// Where rays enter and leave boxes, in two forms. The contract's form is that of the triangles' own
+// boxes, which decide about hits: the same bits everywhere. The quick form is that of nodes, which
+// decide nothing: a multiply-add a plane, with boxes taken as grown by more, so that it never
+// rejects a box that holds a triangle whose own box is met. In either form each step rounds
+// monotonically, so a box that contains another is entered no later and left no earlier, to the
+// last bit.
 #pragma once
 
 #include "kernels/ray_setup.h"
@@ -13,15 +15,15 @@ struct Interval {
     Float<N, Isa> enter, exit;
 };
 
-/// Rays of mixed directions against a box. For each axis the order of its planes follows from dir.
+/// Rays against triangles' boxes. For each axis the order of its planes follows from dir.
 template <int N, class Isa>
 PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray,
                                      const Float<N, Isa> (&lower)[3],
                                      const Float<N, Isa> (&upper)[3]) {
     Interval<N, Isa> out;
     for (int a = 0; a < 3; ++a) {
-        const Float<N, Isa> t0 = (lower[a] - ray.org_plus[a]) * ray.inv_dir[a];
-        const Float<N, Isa> t1 = (upper[a] - ray.org_minus[a]) * ray.inv_dir[a];
+        const Float<N, Isa> t0 = (lower[a] - ray.org[0][a]) * ray.reciprocal[a];
+        const Float<N, Isa> t1 = (upper[a] - ray.org[1][a]) * ray.reciprocal[a];
         out.enter = a == 0 ? min(t0, t1) : max(out.enter, min(t0, t1));
         out.exit = a == 0 ? max(t0, t1) : min(out.exit, max(t0, t1));
     }
@@ -33,21 +35,18 @@ PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray,
 template <Directions directions, int N, class Isa>
 PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray, const Node& node) {
     using F = Float<N, Isa>;
-    if constexpr (directions == Directions::kMixed) {
-        const F lower[3] = {node.plane[0][0], node.plane[0][1], node.plane[0][2]};
-        const F upper[3] = {node.plane[1][0], node.plane[1][1], node.plane[1][2]};
-        return slabs(ray, lower, upper);
-    } else {
-        Interval<N, Isa> out;
-        for (int a = 0; a < 3; ++a) {
-            const int near = ray.near_side[a];
-            const F t_near = (F(node.plane[near][a]) - ray.org_near[a]) * ray.inv_dir[a];
-            const F t_far = (F(node.plane[1 - near][a]) - ray.org_far[a]) * ray.inv_dir[a];
-            out.enter = a == 0 ? t_near : max(out.enter, t_near);
-            out.exit = a == 0 ? t_far : min(out.exit, t_far);
-        }
-        return out;
+    Interval<N, Isa> out;
+    for (int a = 0; a < 3; ++a) {
+        const int near = directions == Directions::kShared ? ray.near_side[a] : 0;
+        const F t0 = multiply_subtract(F(node.plane[near][a]), ray.inv_dir[a], ray.shift[near][a]);
+        const F t1 =
+            multiply_subtract(F(node.plane[1 - near][a]), ray.inv_dir[a], ray.shift[1 - near][a]);
+        const F t_near = directions == Directions::kShared ? t0 : min(t0, t1);
+        const F t_far = directions == Directions::kShared ? t1 : max(t0, t1);
+        out.enter = a == 0 ? t_near : max(out.enter, t_near);
+        out.exit = a == 0 ? t_far : min(out.exit, t_far);
     }
+    return out;
 }
 
 /// The lanes that may find something nearer than, or as near as, `best_t` in the box.

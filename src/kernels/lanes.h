@@ -1,6 +1,7 @@
 // N lanes of floats, integers and truth values, of one instruction set: what kernels compute with.
 // N lanes take as many registers as they need (16 lanes: one of AVX-512, two of AVX2, four of SSE).
-// Every operation rounds as IEEE 754 says, once, so a lane's bits do not depend on N or the ISA.
+// Every operation rounds as IEEE 754 says, once, so a lane's bits do not depend on N or the ISA;
+// but for multiply_subtract, which says so.
 #pragma once
 
 #include "core/macros.h"
@@ -135,6 +136,12 @@ struct Float : LaneValues<Float<N, Isa>, float, N, Isa> {
         for (int i = 0; i < kCount; ++i) a.r[i] = Reg::div(a.r[i], b.r[i]);
         return a;
     }
+    /// a * b - c, rounded once where the ISA has fused multiply-add, else twice: for what bounds an
+    /// answer, never for the answer.
+    PACKET_INLINE friend Float multiply_subtract(Float a, const Float& b, const Float& c) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::multiply_subtract(a.r[i], b.r[i], c.r[i]);
+        return a;
+    }
     PACKET_INLINE friend Float abs(Float a) {
         for (int i = 0; i < kCount; ++i) a.r[i] = Reg::abs(a.r[i]);
         return a;
@@ -162,6 +169,24 @@ struct Int : LaneValues<Int<N, Isa>, std::int32_t, N, Isa> {
         for (int i = 0; i < kCount; ++i) r[i] = Reg::broadcast(a);
     }
 };
+
+/// Lanes that take several registers, one register of them at a time: what keeps many values alive
+/// spills less so.
+template <int N, class Isa>
+inline constexpr int kPartSize = LanesOf<N, Isa>::Reg::kWidth;
+
+template <int N, class Isa>
+PACKET_INLINE Float<kPartSize<N, Isa>, Isa> part(const Float<N, Isa>& lanes, int i) {
+    Float<kPartSize<N, Isa>, Isa> out;
+    out.r[0] = lanes.r[i];
+    return out;
+}
+template <int N, class Isa>
+PACKET_INLINE Mask<kPartSize<N, Isa>, Isa> part(const Mask<N, Isa>& lanes, int i) {
+    Mask<kPartSize<N, Isa>, Isa> out;
+    out.r[0] = lanes.r[i];
+    return out;
+}
 
 /// Three floats a lane.
 template <int N, class Isa>

@@ -15,6 +15,8 @@ namespace packet {
 /// planes of boxes and the axes of the shear are known without looking at the lanes.
 enum class Directions { kShared, kMixed };
 
+inline constexpr float kLargestFloat = 3.402823466e38f;
+
 /// Rays as they come in. Lanes that take no part hold a ray that hits nothing.
 template <int N, class Isa>
 struct RayLanes {
@@ -22,45 +24,98 @@ struct RayLanes {
     F org[3], dir[3], tnear, tfar;
 };
 
-/// Rays prepared for the boxes and triangles of one tree.
+/// What the triangle test needs: the shear that turns rays into the unit z axis.
 template <int N, class Isa>
-struct PreparedRays {
+struct ShearRays {
     using F = Float<N, Isa>;
     using M = Mask<N, Isa>;
 
-    F org_plus[3], org_minus[3];  ///< org + e meets lower planes, org - e upper ones
-    F inv_dir[3];                 ///< 1 / dir, finite
-    F tnear;
-
     F org[3];  ///< kShared: axes in the order `axis`, else x y z
     F shear_x, shear_y, scale_z;
-    M z_is_x, z_is_y;           ///< kMixed: which axis is longest
-    int axis[3] = {0, 1, 2};    ///< kShared: the axes that become x, y, z
-    int near_side[3] = {};      ///< kShared: per axis, the plane of a node that is met first
-    F org_near[3], org_far[3];  ///< kShared: what meets the near and the far planes
-    Directions directions = Directions::kMixed;
+    M z_is_x, z_is_y;         ///< kMixed: which axis is longest
+    int axis[3] = {0, 1, 2};  ///< kShared: the axes that become x, y, z
 };
+
+/// Rays prepared for the boxes and triangles of one tree. Arrays of two are indexed by the side of
+/// a box: 0 its lower planes, 1 the upper ones.
+template <int N, class Isa>
+struct PreparedRays {
+    using F = Float<N, Isa>;
+
+    F tnear;
+    /// For nodes, by the quick form: t = plane * inv_dir - shift[side].
+    F inv_dir[3], shift[2][3];
+    int near_side[3] = {};  ///< kShared: per axis, the plane of a box that is met first
+    Directions directions = Directions::kMixed;
+    ShearRays<N, Isa> shear;
+    /// For triangles' boxes, by the contract's form: t = (plane - org[side]) * reciprocal.
+    F org[2][3], reciprocal[3];
+};
+
+/// What the triangle test needs of one register's lanes.
+template <int N, class Isa>
+PACKET_INLINE auto part(const ShearRays<N, Isa>& ray, int i) {
+    ShearRays<kPartSize<N, Isa>, Isa> out;
+    for (int a = 0; a < 3; ++a) {
+        out.org[a] = part(ray.org[a], i);
+        out.axis[a] = ray.axis[a];
+    }
+    out.shear_x = part(ray.shear_x, i);
+    out.shear_y = part(ray.shear_y, i);
+    out.scale_z = part(ray.scale_z, i);
+    out.z_is_x = part(ray.z_is_x, i);
+    out.z_is_y = part(ray.z_is_y, i);
+    return out;
+}
+template <int N, class Isa>
+PACKET_INLINE auto part(const PreparedRays<N, Isa>& ray, int i) {
+    PreparedRays<kPartSize<N, Isa>, Isa> out;
+    out.tnear = part(ray.tnear, i);
+    out.shear = part(ray.shear, i);
+    for (int a = 0; a < 3; ++a) {
+        out.org[0][a] = part(ray.org[0][a], i);
+        out.org[1][a] = part(ray.org[1][a], i);
+        out.reciprocal[a] = part(ray.reciprocal[a], i);
+    }
+    return out;
+}
 
 /// 1 / x, or the largest float of x's sign where that overflows, so that 0 * 1/0 is no NaN.
 template <int N, class Isa>
 PACKET_INLINE Float<N, Isa> safe_reciprocal(const Float<N, Isa>& x) {
-    constexpr float kLargest = 3.402823466e38f;
-    return max(Float<N, Isa>(-kLargest), min(Float<N, Isa>(kLargest), Float<N, Isa>(1.0f) / x));
+    return max(Float<N, Isa>(-kLargestFloat),
+               min(Float<N, Isa>(kLargestFloat), Float<N, Isa>(1.0f) / x));
 }
 
 /// Lanes whose ray can hit anything: finite, ordered numbers, and 1 / dir is finite on some axis.
 template <int N, class Isa>
 PACKET_INLINE Mask<N, Isa> usable(const RayLanes<N, Isa>& ray) {
     using F = Float<N, Isa>;
-    constexpr float kLargest = 3.402823466e38f;
     constexpr float kSmallestNormal = 1.175494351e-38f;
     Mask<N, Isa> ok = ray.tnear <= ray.tfar;
     for (int a = 0; a < 3; ++a) {
-        ok = ok & (abs(ray.org[a]) <= F(kLargest)) & (abs(ray.dir[a]) <= F(kLargest));
+        ok = ok & (abs(ray.org[a]) <= F(kLargestFloat)) & (abs(ray.dir[a]) <= F(kLargestFloat));
     }
     // max(x, NaN) is NaN, but a NaN direction has been ruled out above
     const F longest = max(abs(ray.dir[0]), max(abs(ray.dir[1]), abs(ray.dir[2])));
     return ok & (longest >= F(kSmallestNormal));
+}
+
+/// object = M * world, rounded in this order on every ISA.
+template <int N, class Isa>
+PACKET_INLINE RayLanes<N, Isa> to_object(const InstanceView& instance,
+                                         const RayLanes<N, Isa>& world) {
+    using F = Float<N, Isa>;
+    RayLanes<N, Isa> out;
+    for (int row = 0; row < 3; ++row) {
+        const float* m = instance.object_from_world[row];
+        out.dir[row] = F(m[0]) * world.dir[0] + F(m[1]) * world.dir[1] + F(m[2]) * world.dir[2];
+        out.org[row] =
+            F(m[0]) * world.org[0] + F(m[1]) * world.org[1] + F(m[2]) * world.org[2] + F(m[3]);
+    }
+    out.tnear = world.tnear;
+    out.tfar = world.tfar;
+    return out;
 }
 
 /// By how much boxes of the tree are grown for each lane, as TreeView::slack says.
@@ -75,17 +130,47 @@ PACKET_INLINE Float<N, Isa> box_growth(const TreeView& tree, const RayLanes<N, I
     return (reach + F(tree.reach)) * F(tree.slack);
 }
 
+/// The quick form takes boxes as grown by 8 ulp of the reach and 3 of the origin more than the
+/// contract's form, so that it rejects no box in which that finds a triangle's. It bounds
+/// reciprocals by 2^32 times that of the longest axis; what drift this neglects is less than the
+/// growth. Where a product overflows still, the planes of that axis hold nothing back. See
+/// docs/decisions/box-slack.md.
+template <int N, class Isa>
+PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray,
+                                 const Float<N, Isa>& growth) {
+    using F = Float<N, Isa>;
+    constexpr float kSteepest = 0x1p32f;
+    constexpr float kInfinity = __builtin_huge_valf();
+    const F least =
+        min(abs(out.reciprocal[0]), min(abs(out.reciprocal[1]), abs(out.reciprocal[2])));
+    const F limit = min(F(kLargestFloat), least * F(kSteepest));
+    for (int a = 0; a < 3; ++a) {
+        const F inv_dir = max(F(0.0f) - limit, min(limit, out.reciprocal[a]));
+        const F more = growth + growth + abs(ray.org[a]) * F(4.0f * kOriginSlack);
+        const F lower = (ray.org[a] + more) * inv_dir, upper = (ray.org[a] - more) * inv_dir;
+        // if (|lower| > largest || |upper| > largest) 0 * plane - shift is -inf or inf, which
+        // passes
+        const Mask<N, Isa> fits = max(abs(lower), abs(upper)) <= F(kLargestFloat);
+        const F open = select(inv_dir < F(0.0f), F(-kInfinity), F(kInfinity));
+        out.inv_dir[a] = select(fits, inv_dir, F(0.0f));
+        out.shift[0][a] = select(fits, lower, open);
+        out.shift[1][a] = select(fits, upper, F(0.0f) - open);
+    }
+}
+
 template <int N, class Isa>
 PACKET_INLINE void prepare_boxes(PreparedRays<N, Isa>& out, const TreeView& tree,
                                  const RayLanes<N, Isa>& ray) {
-    const Float<N, Isa> e = box_growth(tree, ray);
+    using F = Float<N, Isa>;
+    const F e = box_growth(tree, ray);
     for (int a = 0; a < 3; ++a) {
         // Far from the world's origin org + e would round back to org: a further ulp of org stays.
-        const Float<N, Isa> growth = e + abs(ray.org[a]) * Float<N, Isa>(kOriginSlack);
-        out.org_plus[a] = ray.org[a] + growth;
-        out.org_minus[a] = ray.org[a] - growth;
-        out.inv_dir[a] = safe_reciprocal(ray.dir[a]);
+        const F growth = e + abs(ray.org[a]) * F(kOriginSlack);
+        out.org[0][a] = ray.org[a] + growth;
+        out.org[1][a] = ray.org[a] - growth;
+        out.reciprocal[a] = safe_reciprocal(ray.dir[a]);
     }
+    prepare_nodes(out, ray, e);
     out.tnear = ray.tnear;
 }
 
@@ -93,29 +178,25 @@ PACKET_INLINE void prepare_boxes(PreparedRays<N, Isa>& out, const TreeView& tree
 template <int N, class Isa>
 PACKET_INLINE void prepare_directions(PreparedRays<N, Isa>& out, std::uint32_t active) {
     out.directions = Directions::kShared;
-    const std::uint32_t x = out.z_is_x.bits() & active;
-    const std::uint32_t y = out.z_is_y.bits() & active;
+    const std::uint32_t x = out.shear.z_is_x.bits() & active;
+    const std::uint32_t y = out.shear.z_is_y.bits() & active;
     const int z_axis = x != 0 ? 0 : y != 0 ? 1 : 2;
     if ((x != 0 && x != active) || (y != 0 && y != active)) out.directions = Directions::kMixed;
     for (int a = 0; a < 3; ++a) {
-        const std::uint32_t negative = (out.inv_dir[a] < Float<N, Isa>(0.0f)).bits() & active;
+        const std::uint32_t negative = (out.reciprocal[a] < Float<N, Isa>(0.0f)).bits() & active;
         if (negative != 0 && negative != active) out.directions = Directions::kMixed;
         out.near_side[a] = negative != 0 ? 1 : 0;
     }
     if (out.directions == Directions::kMixed) return;
-    for (int a = 0; a < 3; ++a) {
-        out.org_near[a] = out.near_side[a] == 0 ? out.org_plus[a] : out.org_minus[a];
-        out.org_far[a] = out.near_side[a] == 0 ? out.org_minus[a] : out.org_plus[a];
-    }
     constexpr int kNext[3] = {1, 2, 0};
-    out.axis[0] = kNext[z_axis];
-    out.axis[1] = kNext[kNext[z_axis]];
-    out.axis[2] = z_axis;
+    out.shear.axis[0] = kNext[z_axis];
+    out.shear.axis[1] = kNext[kNext[z_axis]];
+    out.shear.axis[2] = z_axis;
 }
 
 /// Per lane: longest axis to z, the two after it in cyclic order to x and y.
 template <int N, class Isa>
-PACKET_INLINE Float3<N, Isa> rotate_axes(const PreparedRays<N, Isa>& ray,
+PACKET_INLINE Float3<N, Isa> rotate_axes(const ShearRays<N, Isa>& ray,
                                          const Float<N, Isa> (&p)[3]) {
     return {select(ray.z_is_x, p[1], select(ray.z_is_y, p[2], p[0])),
             select(ray.z_is_x, p[2], select(ray.z_is_y, p[0], p[1])),
@@ -123,44 +204,29 @@ PACKET_INLINE Float3<N, Isa> rotate_axes(const PreparedRays<N, Isa>& ray,
 }
 
 template <int N, class Isa>
-PACKET_INLINE void prepare_triangles(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray,
-                                     std::uint32_t active) {
+PACKET_INLINE void prepare_shear(ShearRays<N, Isa>& shear, const RayLanes<N, Isa>& ray) {
     const auto x = abs(ray.dir[0]), y = abs(ray.dir[1]), z = abs(ray.dir[2]);
-    out.z_is_x = (x >= y) & (x >= z);
-    out.z_is_y = ~out.z_is_x & (y >= z);
-    prepare_directions(out, active);
-
-    const Float3<N, Isa> d = rotate_axes(out, ray.dir);
-    out.shear_x = d.x / d.z;
-    out.shear_y = d.y / d.z;
-    out.scale_z = Float<N, Isa>(1.0f) / d.z;
-    for (int a = 0; a < 3; ++a) {
-        // Read by a constant index in each arm: a computed one would put the lanes into memory.
-        const int from = out.axis[a];
-        out.org[a] = from == 0 ? ray.org[0] : from == 1 ? ray.org[1] : ray.org[2];
-    }
+    shear.z_is_x = (x >= y) & (x >= z);
+    shear.z_is_y = ~shear.z_is_x & (y >= z);
+    const Float3<N, Isa> d = rotate_axes(shear, ray.dir);
+    shear.shear_x = d.x / d.z;
+    shear.shear_y = d.y / d.z;
+    shear.scale_z = Float<N, Isa>(1.0f) / d.z;
 }
 
-/// All of it, for rays whose `active` lanes are usable.
+/// All of it for a packet, whose `active` lanes are usable.
 template <int N, class Isa>
 PACKET_INLINE PreparedRays<N, Isa> prepare(const TreeView& tree, const RayLanes<N, Isa>& ray,
                                            std::uint32_t active) {
     PreparedRays<N, Isa> out;
     prepare_boxes(out, tree, ray);
-    prepare_triangles(out, ray, active);
-    return out;
-}
-
-/// One ray in all lanes.
-template <int N, class Isa>
-PACKET_INLINE RayLanes<N, Isa> broadcast(const RayLanes<1, Isa>& ray) {
-    RayLanes<N, Isa> out;
+    prepare_shear(out.shear, ray);
+    prepare_directions(out, active);
     for (int a = 0; a < 3; ++a) {
-        out.org[a] = ray.org[a].r[0];
-        out.dir[a] = ray.dir[a].r[0];
+        // Read by a constant index in each arm: a computed one would put the lanes into memory.
+        const int from = out.shear.axis[a];
+        out.shear.org[a] = from == 0 ? ray.org[0] : from == 1 ? ray.org[1] : ray.org[2];
     }
-    out.tnear = ray.tnear.r[0];
-    out.tfar = ray.tfar.r[0];
     return out;
 }
 

@@ -32,6 +32,7 @@ struct ScalarRegister {
     PACKET_INLINE static F sub(F a, F b) { return a - b; }
     PACKET_INLINE static F mul(F a, F b) { return a * b; }
     PACKET_INLINE static F div(F a, F b) { return a / b; }
+    PACKET_INLINE static F multiply_subtract(F a, F b, F c) { return a * b - c; }
     PACKET_INLINE static F abs(F a) { return __builtin_fabsf(a); }
     PACKET_INLINE static F min(F a, F b) { return a < b ? a : b; }
     PACKET_INLINE static F max(F a, F b) { return a > b ? a : b; }
@@ -100,6 +101,7 @@ struct XsimdRegister {
     PACKET_INLINE static F sub(F a, F b) { return a - b; }
     PACKET_INLINE static F mul(F a, F b) { return a * b; }
     PACKET_INLINE static F div(F a, F b) { return a / b; }
+    PACKET_INLINE static F multiply_subtract(F a, F b, F c) { return xsimd::fms(a, b, c); }
     PACKET_INLINE static F abs(F a) { return xsimd::abs(a); }
     PACKET_INLINE static F min(F a, F b) { return xsimd::min(a, b); }
     PACKET_INLINE static F max(F a, F b) { return xsimd::max(a, b); }

@@ -1,11 +1,10 @@
-// Walks a scene: the tree over instances, and in its leaves the trees of their meshes, with the
-// rays moved into the space of the mesh and `t` left alone. A scene that is one mesh is walked
-// directly.
+// Walks a scene with packets: the tree over instances, and in its leaves the trees of their meshes,
+// with the rays moved into the space of the mesh and `t` left alone. A scene that is one mesh is
+// walked directly.
 #pragma once
 
 #include "kernels/leaf.h"
 #include "kernels/packet_walk.h"
-#include "kernels/single_walk.h"
 
 namespace packet {
 
@@ -13,11 +12,11 @@ template <Query query, Directions directions, int N, class Isa, class Stats>
 PACKET_INLINE void walk_mesh_directed(const TreeView& tree, const PreparedRays<N, Isa>& ray,
                                       std::int32_t instance_id, BestHits<N, Isa>& best,
                                       Stats& stats) {
+    const PacketLeaf<query, directions, N, Isa> leaf{tree, ray, instance_id, best};
     walk_tree<directions>(tree, ray, best.t, stats,
                           [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
                               stats.triangles(count(active) * static_cast<int>(item_count));
-                              meet_triangles<query, directions>(tree, ray, first, item_count,
-                                                                instance_id, best);
+                              leaf.meet(first, item_count, active);
                           });
 }
 
@@ -32,43 +31,15 @@ template <Query query, int N, class Isa, class Stats>
     const Mask<N, Isa> active = looking & usable(ray);
     if (none(active)) return;
     best.enter_instance(instance_id);
-    if constexpr (N == 1) {
-        const PreparedRays<kWideSize, Isa> prepared =
-            prepare(tree, broadcast<kWideSize>(ray), 0xFF);
-        walk_wide_tree<query>(
-            tree, prepared, best.t.r[0], stats, [&](std::uint32_t first, std::uint32_t item_count) {
-                stats.triangles(static_cast<int>(item_count));
-                meet_blocks<query>(tree, prepared, first, item_count, instance_id, best);
-            });
+    const PreparedRays<N, Isa> prepared = prepare(tree, ray, active.bits());
+    const F kept = best.t;
+    best.t = select(active, best.t, F(kNever));
+    if (prepared.directions == Directions::kShared) {
+        walk_mesh_directed<query, Directions::kShared>(tree, prepared, instance_id, best, stats);
     } else {
-        const PreparedRays<N, Isa> prepared = prepare(tree, ray, active.bits());
-        const F kept = best.t;
-        best.t = select(active, best.t, F(kNever));
-        if (prepared.directions == Directions::kShared) {
-            walk_mesh_directed<query, Directions::kShared>(tree, prepared, instance_id, best,
-                                                           stats);
-        } else {
-            walk_mesh_directed<query, Directions::kMixed>(tree, prepared, instance_id, best, stats);
-        }
-        best.t = select(active, best.t, kept);
+        walk_mesh_directed<query, Directions::kMixed>(tree, prepared, instance_id, best, stats);
     }
-}
-
-/// object = M * world, rounded in this order on every ISA.
-template <int N, class Isa>
-PACKET_INLINE RayLanes<N, Isa> to_object(const InstanceView& instance,
-                                         const RayLanes<N, Isa>& world) {
-    using F = Float<N, Isa>;
-    RayLanes<N, Isa> out;
-    for (int row = 0; row < 3; ++row) {
-        const float* m = instance.object_from_world[row];
-        out.dir[row] = F(m[0]) * world.dir[0] + F(m[1]) * world.dir[1] + F(m[2]) * world.dir[2];
-        out.org[row] =
-            F(m[0]) * world.org[0] + F(m[1]) * world.org[1] + F(m[2]) * world.org[2] + F(m[3]);
-    }
-    out.tnear = world.tnear;
-    out.tfar = world.tfar;
-    return out;
+    best.t = select(active, best.t, kept);
 }
 
 /// The lanes of `active` meet the instances of a leaf of the top tree; the others sit out.
@@ -95,22 +66,13 @@ PACKET_INLINE void walk_scene(const SceneView& scene, const RayLanes<N, Isa>& ra
         return;
     }
     if (scene.top.node_count == 0) return;
-    if constexpr (N == 1) {
-        const auto prepared = prepare(scene.top, broadcast<kWideSize>(ray), 0xFF);
-        walk_wide_tree<query>(scene.top, prepared, best.t.r[0], stats,
-                              [&](std::uint32_t first, std::uint32_t item_count) {
-                                  meet_instances<query>(scene, ray, first, item_count,
-                                                        Mask<1, Isa>::from_bits(1), best, stats);
-                              });
-    } else {
-        PreparedRays<N, Isa> prepared;
-        prepare_boxes(prepared, scene.top, ray);
-        walk_tree<Directions::kMixed>(
-            scene.top, prepared, best.t, stats,
-            [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
-                meet_instances<query>(scene, ray, first, item_count, active, best, stats);
-            });
-    }
+    PreparedRays<N, Isa> prepared;
+    prepare_boxes(prepared, scene.top, ray);
+    walk_tree<Directions::kMixed>(
+        scene.top, prepared, best.t, stats,
+        [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
+            meet_instances<query>(scene, ray, first, item_count, active, best, stats);
+        });
 }
 
 }  // namespace packet

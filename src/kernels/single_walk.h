@@ -8,6 +8,7 @@
 
 #include "kernels/best_hit.h"
 #include "kernels/box.h"
+#include "kernels/single_ray.h"
 
 namespace packet {
 
@@ -15,24 +16,25 @@ namespace packet {
 template <class Isa>
 struct WideRay {
     using F = Float<kWideSize, Isa>;
-    F org_near[3], org_far[3], inv_dir[3], tnear;
+    F inv_dir[3], near_shift[3], far_shift[3], tnear;
     int near_side[3];
 
-    PACKET_INLINE explicit WideRay(const PreparedRays<kWideSize, Isa>& ray) : tnear(ray.tnear) {
+    PACKET_INLINE explicit WideRay(const SingleRay& ray) : tnear(ray.lanes.tnear[ray.lane]) {
         for (int a = 0; a < 3; ++a) {
             near_side[a] = ray.near_side[a];
-            org_near[a] = ray.org_near[a];
-            org_far[a] = ray.org_far[a];
-            inv_dir[a] = ray.inv_dir[a];
+            inv_dir[a] = ray.lanes.inv_dir[a][ray.lane];
+            near_shift[a] = ray.lanes.shift[near_side[a]][a][ray.lane];
+            far_shift[a] = ray.lanes.shift[1 - near_side[a]][a][ray.lane];
         }
     }
-    /// Where the ray enters and leaves the children's boxes, by the arithmetic of box.h.
+    /// Where the ray enters and leaves the children's boxes, by the quick form of box.h.
     PACKET_INLINE Interval<kWideSize, Isa> slabs(const WideNode& node) const {
         Interval<kWideSize, Isa> out;
         for (int a = 0; a < 3; ++a) {
-            const int near = near_side[a];
-            const F t_near = (F::load(node.plane[near][a]) - org_near[a]) * inv_dir[a];
-            const F t_far = (F::load(node.plane[1 - near][a]) - org_far[a]) * inv_dir[a];
+            const F t_near =
+                multiply_subtract(F::load(node.plane[near_side[a]][a]), inv_dir[a], near_shift[a]);
+            const F t_far = multiply_subtract(F::load(node.plane[1 - near_side[a]][a]), inv_dir[a],
+                                              far_shift[a]);
             out.enter = a == 0 ? t_near : max(out.enter, t_near);
             out.exit = a == 0 ? t_far : min(out.exit, t_far);
         }
@@ -40,71 +42,99 @@ struct WideRay {
     }
 };
 
-struct SingleEntry {
-    float enter;
-    std::uint32_t link, count;
+/// Subtrees to visit, the nearest on top.
+struct SingleStack {
+    struct Entry {
+        float enter;
+        WideChild child;
+    };
+    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
+    Entry entries[kMaxDepth * (kWideSize - 1) + 1];
+    int depth = 0;
+
+    PACKET_INLINE void push(const WideChild& child, float enter) {
+        entries[depth++] = {enter, child};
+    }
+    /// Pushes below the entries that are nearer, down to `bottom`. Insertion: seldom more than
+    /// three children are met.
+    PACKET_INLINE void insert(const WideChild& child, float enter, int bottom) {
+        int place = depth++;
+        for (; place > bottom && entries[place - 1].enter < enter; --place) {
+            entries[place] = entries[place - 1];
+        }
+        entries[place] = {enter, child};
+    }
+    /// The nearest subtree that begins before `best_t`; false if there is none.
+    PACKET_INLINE bool pop(float best_t, WideChild& out) {
+        while (depth != 0) {
+            const Entry& top = entries[--depth];
+            if (top.enter > best_t) continue;
+            out = top.child;
+            return true;
+        }
+        return false;
+    }
 };
 
-PACKET_INLINE void put(SingleEntry& entry, const WideNode& node, int child, float enter) {
-    entry.enter = enter;
-    entry.link = node.link[child];
-    entry.count = node.count[child];
-}
-
-/// Pushes the children of `bits`: for closest-hit the farthest first, so that the nearest is popped
-/// next, by insertion, since seldom more than three are met; for any-hit as they come.
-template <Query query>
-PACKET_INLINE int push_children(const WideNode& node, const float* enter, std::uint32_t bits,
-                                SingleEntry* stack, int depth) {
-    const int bottom = depth;
+/// Takes one of the children of `bits` (not empty), for closest-hit the nearest, and pushes the
+/// others: for closest-hit in order of entry, for any-hit as they come.
+template <Query query, class Isa>
+PACKET_INLINE WideChild descend(const WideNode& node, const Float<kWideSize, Isa>& enters,
+                                std::uint32_t bits, SingleStack& stack) {
+    const int first = __builtin_ctz(bits);
+    bits &= bits - 1;
+    if (bits == 0) return node.child[first];
+    float enter[kWideSize];
+    enters.store(enter);
+    const int second = __builtin_ctz(bits);
+    bits &= bits - 1;
+    const bool swapped = query == Query::kClosest && enter[second] < enter[first];
+    const int near = swapped ? second : first, far = swapped ? first : second;
+    if (bits == 0) {
+        stack.push(node.child[far], enter[far]);
+        return node.child[near];
+    }
+    const int bottom = stack.depth;
+    stack.push(node.child[far], enter[far]);
+    stack.push(node.child[near], enter[near]);
     for (; bits != 0; bits &= bits - 1) {
         const int child = __builtin_ctz(bits);
-        int place = depth++;
         if constexpr (query == Query::kClosest) {
-            for (; place > bottom && stack[place - 1].enter < enter[child]; --place) {
-                stack[place] = stack[place - 1];
-            }
+            stack.insert(node.child[child], enter[child], bottom);
+        } else {
+            stack.push(node.child[child], enter[child]);
         }
-        put(stack[place], node, child, enter[child]);
     }
-    return depth;
+    return stack.entries[--stack.depth].child;
 }
 
 /// Calls leaf(first, count) for each leaf whose box the ray meets before `best_t`, which leaf may
 /// lower; kNever ends the walk.
 template <Query query, class Isa, class Stats, class Leaf>
-PACKET_INLINE void walk_wide_tree(const TreeView& tree, const PreparedRays<kWideSize, Isa>& ray,
-                                  const float& best_t, Stats& stats, Leaf&& leaf) {
+PACKET_INLINE void walk_wide_tree(const TreeView& tree, const SingleRay& ray, const float& best_t,
+                                  Stats& stats, Leaf&& leaf) {
     using F = Float<kWideSize, Isa>;
     const WideRay<Isa> wide(ray);
-    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
-    SingleEntry stack[kMaxDepth * (kWideSize - 1) + 1];
-    int depth = 0;
-    std::uint32_t node_id = 0;
+    SingleStack stack;
+    WideChild next = {0, 0};
     for (;;) {
-        const WideNode& node = tree.wide_nodes[node_id];
-        stats.visit(1, 1);
-        const Interval<kWideSize, Isa> boxes = wide.slabs(node);
-        // if (max(enter, tnear) > min(exit, best_t)) the ray misses; equal must pass, for the tie
-        // rule
-        const std::uint32_t bits =
-            (max(boxes.enter, wide.tnear) <= min(boxes.exit, F(best_t))).bits();
-        if (bits != 0) {
-            float enter[kWideSize];
-            boxes.enter.store(enter);
-            depth = push_children<query>(node, enter, bits, stack, depth);
-        }
-        for (;;) {
-            if (depth == 0) return;
-            const SingleEntry top = stack[--depth];
-            if (top.enter > best_t) continue;
-            if (top.count == 0) {
-                node_id = top.link;
-                break;
+        if (!next.is_leaf()) {
+            const WideNode& node = tree.wide_nodes[next.link];
+            stats.visit(1, 1);
+            const Interval<kWideSize, Isa> boxes = wide.slabs(node);
+            // if (max(enter, tnear) > min(exit, best_t)) the ray misses; equal must pass, for the
+            // tie rule
+            const std::uint32_t bits =
+                (max(boxes.enter, wide.tnear) <= min(boxes.exit, F(best_t))).bits();
+            if (bits != 0) {
+                next = descend<query>(node, boxes.enter, bits, stack);
+                continue;
             }
-            leaf(top.link, top.count);
+        } else {
+            leaf(next.link, next.count);
             if (query == Query::kAny && best_t == kNever) return;
         }
+        if (!stack.pop(best_t, next)) return;
     }
 }
 

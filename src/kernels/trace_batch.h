@@ -4,6 +4,7 @@
 #include "kernels/counters.h"
 #include "kernels/kernel_table.h"
 #include "kernels/scene_walk.h"
+#include "kernels/single_scene_walk.h"
 #include "kernels/triangle_box_axes.h"
 #include "kernels/triangle_box_clip.h"
 
@@ -16,11 +17,12 @@ struct RayArrays {
     alignas(4 * N) float component[8][N];
 };
 
-/// N hits transposed.
+/// N hits transposed. Bit i of `found`: lane i has one.
 template <int N, class Isa>
 struct HitArrays {
     float t[N], u[N], v[N];
     std::int32_t prim_id[N], instance_id[N];
+    std::uint32_t found;
 };
 
 /// Loads the lanes of `active`; the others become NaN, which takes part in nothing.
@@ -36,18 +38,6 @@ PACKET_INLINE RayLanes<N, Isa> load_rays(const float* const (&component)[8], Mas
             lanes[7]};
 }
 
-template <Query query, int N, class Isa, class Stats>
-PACKET_INLINE BestHits<N, Isa> trace_lanes(const SceneView& scene,
-                                           const float* const (&component)[8],
-                                           std::uint32_t active_bits, Stats& stats) {
-    const Mask<N, Isa> asked = Mask<N, Isa>::from_bits(active_bits);
-    const RayLanes<N, Isa> ray = load_rays(component, asked);
-    const Mask<N, Isa> active = asked & usable(ray);
-    BestHits<N, Isa> best(ray.tfar, active);
-    if (any(active)) walk_scene<query>(scene, ray, best, stats);
-    return best;
-}
-
 template <int N, class Isa>
 PACKET_INLINE void store_hits(const BestHits<N, Isa>& best, HitArrays<N, Isa>& out) {
     using F = Float<N, Isa>;
@@ -57,6 +47,37 @@ PACKET_INLINE void store_hits(const BestHits<N, Isa>& best, HitArrays<N, Isa>& o
     best.v.store(out.v);
     select(found, best.prim_id, Int<N, Isa>(-1)).store(out.prim_id);
     select(found, best.instance_id, Int<N, Isa>(-1)).store(out.instance_id);
+    out.found = found.bits();
+}
+
+/// How a kernel's rays walk: one by one, or together.
+enum class Walk { kSingle, kPacket };
+
+/// The lanes of `active_bits` trace; the others of `out` are of no meaning.
+template <Walk walk, Query query, int N, class Isa, class Stats>
+PACKET_INLINE void trace_lanes(const SceneView& scene, const float* const (&component)[8],
+                               std::uint32_t active_bits, Stats& stats, HitArrays<N, Isa>& out) {
+    const Mask<N, Isa> asked = Mask<N, Isa>::from_bits(active_bits);
+    const RayLanes<N, Isa> ray = load_rays(component, asked);
+    const Mask<N, Isa> active = asked & usable(ray);
+    BestHits<N, Isa> best(ray.tfar, active);
+    if constexpr (walk == Walk::kPacket) {
+        if (any(active)) walk_scene<query>(scene, ray, best, stats);
+        store_hits(best, out);
+    } else {
+        store_hits(best, out);  // all miss
+        if (none(active)) return;
+        walk_scene_singly<query>(scene, ray, active.bits(), stats,
+                                 [&](int lane, const BestHits<1, Isa>& one) {
+                                     if (none(one.found())) return;
+                                     out.found |= 1u << lane;
+                                     out.t[lane] = one.t.r[0];
+                                     out.u[lane] = one.u.r[0];
+                                     out.v[lane] = one.v.r[0];
+                                     out.prim_id[lane] = one.prim_id.r[0];
+                                     out.instance_id[lane] = one.instance_id.r[0];
+                                 });
+    }
 }
 
 /// The mesh is looked up last: an instance's mesh never changes.
@@ -93,7 +114,7 @@ PACKET_INLINE void scatter_hits(const TraceBatch& batch, std::size_t begin, int 
     }
 }
 
-template <Query query, int N, class Isa, class Stats>
+template <Walk walk, Query query, int N, class Isa, class Stats>
 void trace_batch(const TraceBatch& batch) noexcept {
     Stats stats(batch.stats);
     RayArrays<N, Isa> rays = {};
@@ -105,35 +126,33 @@ void trace_batch(const TraceBatch& batch) noexcept {
         const int lanes = left < N ? static_cast<int>(left) : N;
         gather_rays(batch, begin, lanes, rays);
         const std::uint32_t active = static_cast<std::uint32_t>((std::uint64_t{1} << lanes) - 1);
-        const BestHits<N, Isa> best =
-            trace_lanes<query, N, Isa>(*batch.scene, component, active, stats);
+        HitArrays<N, Isa> hits;
+        trace_lanes<walk, query>(*batch.scene, component, active, stats, hits);
         if constexpr (query == Query::kAny) {
-            const std::uint32_t found = best.found().bits();
             for (int i = 0; i < lanes; ++i) {
-                batch.occluded[place(batch, begin + static_cast<std::size_t>(i))] = found >> i & 1u;
+                batch.occluded[place(batch, begin + static_cast<std::size_t>(i))] =
+                    hits.found >> i & 1u;
             }
         } else {
-            HitArrays<N, Isa> hits;
-            store_hits(best, hits);
             scatter_hits(batch, begin, lanes, hits);
         }
     }
 }
 
 template <Query query, int N, class Isa>
-PACKET_INLINE BestHits<N, Isa> trace_ray_packet(const SceneView& scene, const RayPacket<N>& rays,
-                                                std::uint32_t active) {
+PACKET_INLINE void trace_ray_packet(const SceneView& scene, const RayPacket<N>& rays,
+                                    std::uint32_t active, HitArrays<N, Isa>& out) {
     NoCounters stats(nullptr);
     const float* const component[8] = {rays.org_x, rays.org_y, rays.org_z, rays.tnear,
                                        rays.dir_x, rays.dir_y, rays.dir_z, rays.tfar};
-    return trace_lanes<query, N, Isa>(scene, component, active, stats);
+    trace_lanes<Walk::kPacket, query>(scene, component, active, stats, out);
 }
 
 template <int N, class Isa>
 void closest_packet(const SceneView& scene, const RayPacket<N>& rays, std::uint32_t active,
                     HitPacket<N>& out) noexcept {
     HitArrays<N, Isa> hits;
-    store_hits(trace_ray_packet<Query::kClosest, N, Isa>(scene, rays, active), hits);
+    trace_ray_packet<Query::kClosest>(scene, rays, active, hits);
     for (; active != 0; active &= active - 1) {
         const int i = __builtin_ctz(active);
         out.t[i] = hits.t[i], out.u[i] = hits.u[i], out.v[i] = hits.v[i];
@@ -146,23 +165,26 @@ void closest_packet(const SceneView& scene, const RayPacket<N>& rays, std::uint3
 template <int N, class Isa>
 std::uint32_t any_packet(const SceneView& scene, const RayPacket<N>& rays,
                          std::uint32_t active) noexcept {
-    return trace_ray_packet<Query::kAny, N, Isa>(scene, rays, active).found().bits();
+    HitArrays<N, Isa> hits;
+    trace_ray_packet<Query::kAny>(scene, rays, active, hits);
+    return hits.found;
 }
 
 /// All kernels of an instruction set. Each isa_*.cpp fills one.
 template <class Isa>
 constexpr KernelTable make_kernel_table() {
     KernelTable table = {};
-    const auto fill = [&]<int N>(KernelTable::Width width) {
+    const auto fill = [&]<Walk walk, int N>(KernelTable::Width width) {
         using KT = KernelTable;
-        table.closest[width][KT::kNotCounting] = trace_batch<Query::kClosest, N, Isa, NoCounters>;
-        table.closest[width][KT::kCounting] = trace_batch<Query::kClosest, N, Isa, Counters>;
-        table.any[width][KT::kNotCounting] = trace_batch<Query::kAny, N, Isa, NoCounters>;
-        table.any[width][KT::kCounting] = trace_batch<Query::kAny, N, Isa, Counters>;
+        table.closest[width][KT::kNotCounting] =
+            trace_batch<walk, Query::kClosest, N, Isa, NoCounters>;
+        table.closest[width][KT::kCounting] = trace_batch<walk, Query::kClosest, N, Isa, Counters>;
+        table.any[width][KT::kNotCounting] = trace_batch<walk, Query::kAny, N, Isa, NoCounters>;
+        table.any[width][KT::kCounting] = trace_batch<walk, Query::kAny, N, Isa, Counters>;
     };
-    fill.template operator()<1>(KernelTable::kWidth1);
-    fill.template operator()<8>(KernelTable::kWidth8);
-    fill.template operator()<16>(KernelTable::kWidth16);
+    fill.template operator()<Walk::kSingle, kSingleLanes>(KernelTable::kWidth1);
+    fill.template operator()<Walk::kPacket, 8>(KernelTable::kWidth8);
+    fill.template operator()<Walk::kPacket, 16>(KernelTable::kWidth16);
     table.closest8 = closest_packet<8, Isa>;
     table.closest16 = closest_packet<16, Isa>;
     table.any8 = any_packet<8, Isa>;

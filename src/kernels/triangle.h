@@ -3,6 +3,10 @@
 // edge the ray passes. Their signs are exact, so two triangles that share an edge never disagree
 // about it and no ray slips through between them.
 //
+// It comes in two steps. may_hit() computes the edge functions in float, where rounding may turn a
+// sign to zero but never over: it rejects nothing that hits, and nearly all that does not.
+// decide_hits() settles the few lanes that are left.
+//
 // Woop, Benthin, Wald. Watertight ray/triangle intersection. JCGT 2013.
 #pragma once
 
@@ -10,12 +14,6 @@
 #include "kernels/ray_setup.h"
 
 namespace packet {
-
-/// Corners of the lanes' triangles, [corner][axis].
-template <int N, class Isa>
-struct Triangles {
-    Float<N, Isa> v[3][3];
-};
 
 /// Edge functions: twice the signed areas that the ray spans with the edge opposite to a corner.
 template <int N, class Isa>
@@ -104,18 +102,40 @@ template <int N, class Isa>
     hits.v = Float<N, Isa>::load(v);
 }
 
-/// A corner seen from the ray: sheared so that the ray runs along z from the origin.
-template <Directions directions, int N, class Isa>
-PACKET_INLINE Float3<N, Isa> to_ray_space(const PreparedRays<N, Isa>& ray,
-                                          const Float<N, Isa> (&corner)[3]) {
-    Float3<N, Isa> p;
-    if constexpr (directions == Directions::kShared) {
-        p = {corner[0] - ray.org[0], corner[1] - ray.org[1], corner[2] - ray.org[2]};
-    } else {
-        const Float<N, Isa> d[3] = {corner[0] - ray.org[0], corner[1] - ray.org[1],
-                                    corner[2] - ray.org[2]};
-        p = rotate_axes(ray, d);
+/// One triangle of a block, in all lanes.
+struct SameTriangle {
+    const TriangleBlock& block;
+    int lane;
+
+    template <class F>
+    PACKET_INLINE F get(int corner, int axis) const {
+        return block.v[corner][axis][lane];
     }
+    PACKET_INLINE SameTriangle part(int) const { return *this; }
+};
+
+/// A block's triangles, one a lane.
+struct BlockTriangles {
+    const TriangleBlock& block;
+    int first = 0;
+
+    template <class F>
+    PACKET_INLINE F get(int corner, int axis) const {
+        return F::load(block.v[corner][axis] + first);
+    }
+    PACKET_INLINE BlockTriangles part(int offset) const { return {block, first + offset}; }
+};
+
+/// A corner seen from the ray: sheared so that the ray runs along z from the origin.
+template <Directions directions, int N, class Isa, class Triangles>
+PACKET_INLINE Float3<N, Isa> to_ray_space(const ShearRays<N, Isa>& ray, const Triangles& triangles,
+                                          int corner) {
+    using F = Float<N, Isa>;
+    const F d[3] = {triangles.template get<F>(corner, ray.axis[0]) - ray.org[0],
+                    triangles.template get<F>(corner, ray.axis[1]) - ray.org[1],
+                    triangles.template get<F>(corner, ray.axis[2]) - ray.org[2]};
+    Float3<N, Isa> p = {d[0], d[1], d[2]};
+    if constexpr (directions == Directions::kMixed) p = rotate_axes(ray, d);
     return {p.x - ray.shear_x * p.z, p.y - ray.shear_y * p.z, p.z};
 }
 
@@ -131,58 +151,92 @@ PACKET_INLINE Interval<N, Isa> triangle_box(const PreparedRays<N, Isa>& ray,
     return slabs(ray, lower, upper);
 }
 
-/// Edge functions of corners in ray space, exact in sign.
 template <int N, class Isa>
 PACKET_INLINE Edges<N, Isa> edge_functions(const Float3<N, Isa> (&p)[3]) {
-    const Float<N, Isa> zero(0.0f);
-    Edges<N, Isa> e = {p[2].x * p[1].y - p[2].y * p[1].x, p[0].x * p[2].y - p[0].y * p[2].x,
-                       p[1].x * p[0].y - p[1].y * p[0].x};
-    const Mask<N, Isa> undecided = (e.u == zero) | (e.v == zero) | (e.w == zero);
-    if (any(undecided)) [[unlikely]]
-        decide_edges(p, undecided.bits(), e);
-    return e;
+    return {p[2].x * p[1].y - p[2].y * p[1].x, p[0].x * p[2].y - p[0].y * p[2].x,
+            p[1].x * p[0].y - p[1].y * p[0].x};
 }
 
-/// Tests the lanes. `corners(corner, axis)` yields a coordinate of the lanes' triangles, axis being
-/// one of x, y, z. A lane hits if the ray passes inside or on the edges, the triangle's box is met,
-/// and t, moved into that box, lies in [tnear, best_t].
-template <Directions directions, int N, class Isa, class Corners>
-PACKET_INLINE TriangleHits<N, Isa> test_triangles(const PreparedRays<N, Isa>& ray,
-                                                  const Float<N, Isa>& best_t, Corners corners) {
+template <Directions directions, int N, class Isa, class Triangles>
+PACKET_INLINE Mask<N, Isa> may_hit_part(const ShearRays<N, Isa>& ray, const Triangles& triangles) {
     using F = Float<N, Isa>;
-    const F zero(0.0f);
-    Float3<N, Isa> p[3];
-    for (int corner = 0; corner < 3; ++corner) {
-        const F in_ray_order[3] = {corners(corner, ray.axis[0]), corners(corner, ray.axis[1]),
-                                   corners(corner, ray.axis[2])};
-        p[corner] = to_ray_space<directions>(ray, in_ray_order);
-    }
+    const Float3<N, Isa> p[3] = {to_ray_space<directions>(ray, triangles, 0),
+                                 to_ray_space<directions>(ray, triangles, 1),
+                                 to_ray_space<directions>(ray, triangles, 2)};
     const Edges<N, Isa> e = edge_functions(p);
-    const F det = e.u + e.v + e.w;
-    // inside: no two edges see the ray on different sides; false for NaN
+    // false where all are NaN, as in lanes without a triangle
+    return (F(0.0f) <= min(e.u, min(e.v, e.w))) | (max(e.u, max(e.v, e.w)) <= F(0.0f));
+}
+
+/// The lanes whose ray passes inside the triangle or on its edges, as far as float can tell: no two
+/// edges see it on different sides.
+template <Directions directions, int N, class Isa, class Triangles>
+PACKET_INLINE Mask<N, Isa> may_hit(const ShearRays<N, Isa>& ray, const Triangles& triangles) {
+    if constexpr (LanesOf<N, Isa>::kRegisters == 1) {
+        return may_hit_part<directions>(ray, triangles);
+    } else {
+        Mask<N, Isa> out;
+        for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
+            const auto its_triangles = triangles.part(i * kPartSize<N, Isa>);
+            out.r[i] = may_hit_part<directions>(part(ray, i), its_triangles).r[0];
+        }
+        return out;
+    }
+}
+
+/// The lanes whose edge functions do not contradict each other, once zeros are decided.
+template <int N, class Isa>
+PACKET_INLINE Mask<N, Isa> decide_zeros(const Float3<N, Isa> (&p)[3], Mask<N, Isa> candidates,
+                                        Edges<N, Isa>& e) {
+    const Float<N, Isa> zero(0.0f);
+    const Mask<N, Isa> undecided = candidates & ((e.u == zero) | (e.v == zero) | (e.w == zero));
+    if (none(undecided)) [[likely]]
+        return candidates;
+    const Float3<N, Isa> corners[3] = {p[0], p[1],
+                                       p[2]};  // copies: what is passed on lies in memory
+    Edges<N, Isa> decided = e;
+    decide_edges(corners, undecided.bits(), decided);
+    e = decided;
+    return candidates & (((e.u >= zero) & (e.v >= zero) & (e.w >= zero)) |
+                         ((e.u <= zero) & (e.v <= zero) & (e.w <= zero)));
+}
+
+template <Directions directions, int N, class Isa, class Triangles>
+PACKET_INLINE TriangleHits<N, Isa> decide_hits_of_part(const PreparedRays<N, Isa>& ray,
+                                                       const Float<N, Isa>& best_t,
+                                                       Mask<N, Isa> candidates,
+                                                       const Triangles& triangles) {
+    using F = Float<N, Isa>;
+    const F zero(0.0f), scale_z = ray.shear.scale_z;
+    const Float3<N, Isa> p[3] = {to_ray_space<directions>(ray.shear, triangles, 0),
+                                 to_ray_space<directions>(ray.shear, triangles, 1),
+                                 to_ray_space<directions>(ray.shear, triangles, 2)};
+    Edges<N, Isa> e = edge_functions(p);
     TriangleHits<N, Isa> out;
-    out.hit = (((e.u >= zero) & (e.v >= zero) & (e.w >= zero)) |
-               ((e.u <= zero) & (e.v <= zero) & (e.w <= zero))) &
-              ~(det == zero);
-    if (none(out.hit)) return out;
+    out.hit = decide_zeros(p, candidates, e);
+    const F det = e.u + e.v + e.w;
+    out.hit = out.hit & ~(det == zero);
 
     // u and v are the barycentric coordinates that belong to the second and third corner
     const F first = e.u / det;
     out.u = e.v / det, out.v = e.w / det;
-    out.t = first * (ray.scale_z * p[0].z) + out.u * (ray.scale_z * p[1].z) +
-            out.v * (ray.scale_z * p[2].z);
+    out.t = first * (scale_z * p[0].z) + out.u * (scale_z * p[1].z) + out.v * (scale_z * p[2].z);
     const Mask<N, Isa> ill = out.hit & is_ill_conditioned(p, det);
-    if (any(ill)) {
+    if (any(ill)) [[unlikely]] {
         const Float3<N, Isa> ill_corners[3] = {p[0], p[1], p[2]};  // copies, as above
         TriangleHits<N, Isa> refined = out;
-        refine_hits(ill_corners, ray.scale_z, ill.bits(), refined);
+        refine_hits(ill_corners, scale_z, ill.bits(), refined);
         out = refined;
     }
-    F xyz[3][3];
-    for (int corner = 0; corner < 3; ++corner) {
-        for (int a = 0; a < 3; ++a) xyz[corner][a] = corners(corner, a);
+
+    F lower[3], upper[3];
+    for (int a = 0; a < 3; ++a) {
+        const F x0 = triangles.template get<F>(0, a), x1 = triangles.template get<F>(1, a),
+                x2 = triangles.template get<F>(2, a);
+        lower[a] = min(x0, min(x1, x2));
+        upper[a] = max(x0, max(x1, x2));
     }
-    const Interval<N, Isa> box = triangle_box(ray, xyz);
+    const Interval<N, Isa> box = slabs(ray, lower, upper);
     // max and min yield their second operand for NaN: a NaN stays one and fails the comparisons
     const F t = min(box.exit, max(box.enter, out.t)) + zero;  // + 0 makes -0 a 0
     out.hit = out.hit & (box.enter <= box.exit) & (ray.tnear <= t) & (t <= best_t);
@@ -190,6 +244,27 @@ PACKET_INLINE TriangleHits<N, Isa> test_triangles(const PreparedRays<N, Isa>& ra
     out.u = out.u + zero;
     out.v = out.v + zero;
     return out;
+}
+
+/// Which of `candidates`, lanes that may hit, do: the ray passes inside or on the edges, the
+/// triangle's box is met, and t, moved into that box, lies in [tnear, best_t].
+template <Directions directions, int N, class Isa, class Triangles>
+PACKET_INLINE TriangleHits<N, Isa> decide_hits(const PreparedRays<N, Isa>& ray,
+                                               const Float<N, Isa>& best_t, Mask<N, Isa> candidates,
+                                               const Triangles& triangles) {
+    if constexpr (LanesOf<N, Isa>::kRegisters == 1) {
+        return decide_hits_of_part<directions>(ray, best_t, candidates, triangles);
+    } else {
+        TriangleHits<N, Isa> out;
+        for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
+            const auto hits =
+                decide_hits_of_part<directions>(part(ray, i), part(best_t, i), part(candidates, i),
+                                                triangles.part(i * kPartSize<N, Isa>));
+            out.hit.r[i] = hits.hit.r[0];
+            out.t.r[i] = hits.t.r[0], out.u.r[i] = hits.u.r[0], out.v.r[i] = hits.v.r[0];
+        }
+        return out;
+    }
 }
 
 }  // namespace packet

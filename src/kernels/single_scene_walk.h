@@ -1,0 +1,84 @@
+// Walks a scene with single rays, as scene_walk.h does with packets.
+#pragma once
+
+#include "kernels/leaf.h"
+#include "kernels/single_walk.h"
+
+namespace packet {
+
+template <Query query, class Isa, class Stats>
+[[gnu::noinline]] void walk_mesh(const TreeView& tree, const SingleRay& ray,
+                                 std::int32_t instance_id, BestHits<1, Isa>& best, Stats& stats) {
+    best.enter_instance(instance_id);
+    const SingleLeaf<query, Isa> leaf{tree, ray, instance_id, best};
+    walk_wide_tree<query, Isa>(tree, ray, best.t.r[0], stats,
+                               [&](std::uint32_t first, std::uint32_t item_count) {
+                                   stats.triangles(static_cast<int>(item_count));
+                                   leaf.meet(first, item_count);
+                               });
+}
+
+/// The ray meets the instances of a leaf of the top tree.
+template <Query query, class Isa, class Stats>
+PACKET_INLINE void meet_instances(const SceneView& scene, const RayLanes<1, Isa>& ray,
+                                  std::uint32_t first, std::uint32_t item_count,
+                                  BestHits<1, Isa>& best, Stats& stats) {
+    for (std::uint32_t i = first; i < first + item_count && best.t.r[0] != kNever; ++i) {
+        const InstanceView& instance = scene.instances[i];
+        const RayLanes<1, Isa> moved = to_object(instance, ray);
+        if (instance.tree->node_count == 0 || none(usable(moved))) continue;
+        PreparedLanes lanes;
+        prepare_lanes(*instance.tree, broadcast(moved), lanes);
+        walk_mesh<query>(*instance.tree, SingleRay(lanes, 0),
+                         static_cast<std::int32_t>(instance.instance_id), best, stats);
+    }
+}
+
+/// Lanes of rays as arrays, to pick single ones from.
+struct RayColumns {
+    float org[3][kSingleLanes], dir[3][kSingleLanes], tnear[kSingleLanes], tfar[kSingleLanes];
+
+    template <class Isa>
+    PACKET_INLINE explicit RayColumns(const RayLanes<kSingleLanes, Isa>& ray) {
+        for (int a = 0; a < 3; ++a) ray.org[a].store(org[a]), ray.dir[a].store(dir[a]);
+        ray.tnear.store(tnear), ray.tfar.store(tfar);
+    }
+    template <class Isa>
+    PACKET_INLINE RayLanes<1, Isa> lane(int i) const {
+        return {{org[0][i], org[1][i], org[2][i]},
+                {dir[0][i], dir[1][i], dir[2][i]},
+                tnear[i],
+                tfar[i]};
+    }
+};
+
+/// The rays of `active`, which are usable, walk the scene one by one. Calls found(lane, best) with
+/// what each has found.
+template <Query query, class Isa, class Stats, class Found>
+PACKET_INLINE void walk_scene_singly(const SceneView& scene,
+                                     const RayLanes<kSingleLanes, Isa>& rays, std::uint32_t active,
+                                     Stats& stats, Found&& found) {
+    const RayColumns columns(rays);
+    const TreeView& tree = scene.is_single_mesh ? *scene.instances[0].tree : scene.top;
+    PreparedLanes lanes;
+    prepare_lanes(tree, rays, lanes);
+    for (; active != 0; active &= active - 1) {
+        const int i = __builtin_ctz(active);
+        const SingleRay ray(lanes, i);
+        BestHits<1, Isa> best(columns.tfar[i], Mask<1, Isa>::from_bits(1));
+        if (tree.node_count == 0) {
+        } else if (scene.is_single_mesh) {
+            walk_mesh<query>(tree, ray, static_cast<std::int32_t>(scene.instances[0].instance_id),
+                             best, stats);
+        } else {
+            const RayLanes<1, Isa> world = columns.lane<Isa>(i);
+            walk_wide_tree<query, Isa>(
+                tree, ray, best.t.r[0], stats, [&](std::uint32_t first, std::uint32_t item_count) {
+                    meet_instances<query>(scene, world, first, item_count, best, stats);
+                });
+        }
+        found(i, best);
+    }
+}
+
+}  // namespace packet
