@@ -17,10 +17,11 @@ namespace packet {
 
 /// How rays walk the structure. All modes return the same hits.
 enum class Mode : std::uint8_t {
-    kAuto,     ///< looks at the rays, or tries some of them, and picks
-    kSingle,   ///< one ray at a time
-    kPacket8,  ///< 8 rays share one stack
-    kPacket16  ///< 16 rays share one stack
+    kAuto,      ///< looks at the rays, or tries some of them, and picks
+    kSingle,    ///< one ray at a time
+    kPacket8,   ///< 8 rays share one stack
+    kPacket16,  ///< 16 rays share one stack
+    kTile       ///< up to 128 rays share one stack and a beam around them, as far as they cohere
 };
 
 struct ModeName {

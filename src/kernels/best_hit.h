@@ -25,14 +25,14 @@ struct BestHits {
     /// instances all or nothing, as the order of the instances says.
     I tie_prim_id;
 
-    PACKET_INLINE BestHits(const F& tfar, M active)
-        : t(select(active, min(tfar, F(kLargestFloat)), F(kNever))),
-          u(0.0f),
-          v(0.0f),
-          prim_id(kNoId),
-          instance_id(kNoId),
-          tie_prim_id(kNoId) {}
+    BestHits() = default;
+    PACKET_INLINE BestHits(const F& tfar, M active) { reset(tfar, active); }
 
+    PACKET_INLINE void reset(const F& tfar, M active) {
+        t = select(active, min(tfar, F(kLargestFloat)), F(kNever));
+        u = v = 0.0f;
+        prim_id = instance_id = tie_prim_id = kNoId;
+    }
     PACKET_INLINE void enter_instance(std::int32_t id) {
         tie_prim_id = select(I(id) < instance_id, I(kNoId), I(-1));
     }

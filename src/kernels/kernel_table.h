@@ -36,11 +36,11 @@ struct KernelTable {
     using Overlap8 = std::uint32_t (*)(const float (&triangle)[3][3], const float (&lower)[3][8],
                                        const float (&upper)[3][8]) noexcept;
 
-    enum Width { kWidth1, kWidth8, kWidth16, kWidthCount };
+    enum Kernel { kSingle, kPacket8, kPacket16, kTile, kKernelCount };
     enum Counting { kNotCounting, kCounting, kCountingCount };
 
-    Batch closest[kWidthCount][kCountingCount];
-    Batch any[kWidthCount][kCountingCount];
+    Batch closest[kKernelCount][kCountingCount];
+    Batch any[kKernelCount][kCountingCount];
     Closest<8> closest8;
     Closest<16> closest16;
     Any<8> any8;

@@ -8,7 +8,22 @@
 
 namespace packet {
 
-/// A packet meets the triangles `first` to `first + count`, each broadcast to all lanes.
+/// The blocks that hold items `first` to `first + count`, and which lanes of each.
+struct BlockRange {
+    std::uint32_t first, count;
+
+    PACKET_INLINE std::uint32_t begin() const { return first / kBlockSize; }
+    PACKET_INLINE std::uint32_t end() const { return (first + count - 1) / kBlockSize + 1; }
+    PACKET_INLINE std::uint32_t lanes(std::uint32_t block) const {
+        constexpr std::uint32_t kAll = (1u << kBlockSize) - 1;
+        std::uint32_t out = kAll;
+        if (block == begin()) out &= kAll << first % kBlockSize;
+        if (block + 1 == end()) out &= kAll >> (kBlockSize - 1 - (first + count - 1) % kBlockSize);
+        return out;
+    }
+};
+
+/// A packet meets triangles one by one, each broadcast to all lanes.
 template <Query query, Directions directions, int N, class Isa>
 struct PacketLeaf {
     const TreeView& tree;
@@ -16,10 +31,16 @@ struct PacketLeaf {
     std::int32_t instance_id;
     BestHits<N, Isa>& best;
 
-    PACKET_INLINE void meet(std::uint32_t first, std::uint32_t count, Mask<N, Isa> active) const {
-        for (std::uint32_t i = first; i < first + count; ++i) {
-            const TriangleBlock& block = tree.blocks[i / kBlockSize];
-            const int lane = static_cast<int>(i % kBlockSize);
+    PACKET_INLINE void meet(BlockRange range, Mask<N, Isa> active) const {
+        for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
+            meet(tree.blocks[b], range.lanes(b), active);
+        }
+    }
+    /// The triangles of `lanes` in a block.
+    PACKET_INLINE void meet(const TriangleBlock& block, std::uint32_t lanes,
+                            Mask<N, Isa> active) const {
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const int lane = __builtin_ctz(lanes);
             const Mask<N, Isa> candidates =
                 active & may_hit<directions>(ray.shear, SameTriangle{block, lane});
             if (any(candidates)) decide(block, lane, candidates);
@@ -47,7 +68,7 @@ PACKET_INLINE int nearest_lane(std::uint32_t bits, const float* t, const std::in
     return nearest;
 }
 
-/// A single ray meets the blocks that hold triangles `first` to `first + count`. Other leaves'
+/// A single ray meets all blocks of a range at once. Other leaves'
 /// triangles in the same block are met along: they are triangles like any other.
 template <Query query, class Isa>
 struct SingleLeaf {
@@ -59,10 +80,10 @@ struct SingleLeaf {
     std::int32_t instance_id;
     BestHits<1, Isa>& best;
 
-    PACKET_INLINE void meet(std::uint32_t first, std::uint32_t count) const {
+    PACKET_INLINE void meet(BlockRange range) const {
         ShearRays<kBlockSize, Isa> shear;
         ray.broadcast(shear);
-        for (std::uint32_t b = first / kBlockSize; b <= (first + count - 1) / kBlockSize; ++b) {
+        for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
             const TriangleBlock& block = tree.blocks[b];
             const M candidates = may_hit<Directions::kShared>(shear, BlockTriangles{block});
             if (none(candidates)) continue;

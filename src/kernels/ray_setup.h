@@ -32,8 +32,8 @@ struct ShearRays {
 
     F org[3];  ///< kShared: axes in the order `axis`, else x y z
     F shear_x, shear_y, scale_z;
-    M z_is_x, z_is_y;         ///< kMixed: which axis is longest
-    int axis[3] = {0, 1, 2};  ///< kShared: the axes that become x, y, z
+    M z_is_x, z_is_y;  ///< kMixed: which axis is longest
+    int axis[3];       ///< kShared: the axes that become x, y, z; else 0 1 2
 };
 
 /// Rays prepared for the boxes and triangles of one tree. Arrays of two are indexed by the side of
@@ -45,8 +45,8 @@ struct PreparedRays {
     F tnear;
     /// For nodes, by the quick form: t = plane * inv_dir - shift[side].
     F inv_dir[3], shift[2][3];
-    int near_side[3] = {};  ///< kShared: per axis, the plane of a box that is met first
-    Directions directions = Directions::kMixed;
+    int near_side[3];  ///< kShared: per axis, the plane of a box that is met first
+    Directions directions;
     ShearRays<N, Isa> shear;
     /// For triangles' boxes, by the contract's form: t = (plane - org[side]) * reciprocal.
     F org[2][3], reciprocal[3];
@@ -187,11 +187,11 @@ PACKET_INLINE void prepare_directions(PreparedRays<N, Isa>& out, std::uint32_t a
         if (negative != 0 && negative != active) out.directions = Directions::kMixed;
         out.near_side[a] = negative != 0 ? 1 : 0;
     }
-    if (out.directions == Directions::kMixed) return;
     constexpr int kNext[3] = {1, 2, 0};
-    out.shear.axis[0] = kNext[z_axis];
-    out.shear.axis[1] = kNext[kNext[z_axis]];
-    out.shear.axis[2] = z_axis;
+    const int z = out.directions == Directions::kShared ? z_axis : 2;
+    out.shear.axis[0] = kNext[z];
+    out.shear.axis[1] = kNext[kNext[z]];
+    out.shear.axis[2] = z;
 }
 
 /// Per lane: longest axis to z, the two after it in cyclic order to x and y.
@@ -216,9 +216,8 @@ PACKET_INLINE void prepare_shear(ShearRays<N, Isa>& shear, const RayLanes<N, Isa
 
 /// All of it for a packet, whose `active` lanes are usable.
 template <int N, class Isa>
-PACKET_INLINE PreparedRays<N, Isa> prepare(const TreeView& tree, const RayLanes<N, Isa>& ray,
-                                           std::uint32_t active) {
-    PreparedRays<N, Isa> out;
+PACKET_INLINE void prepare(PreparedRays<N, Isa>& out, const TreeView& tree,
+                           const RayLanes<N, Isa>& ray, std::uint32_t active) {
     prepare_boxes(out, tree, ray);
     prepare_shear(out.shear, ray);
     prepare_directions(out, active);
@@ -227,7 +226,6 @@ PACKET_INLINE PreparedRays<N, Isa> prepare(const TreeView& tree, const RayLanes<
         const int from = out.shear.axis[a];
         out.shear.org[a] = from == 0 ? ray.org[0] : from == 1 ? ray.org[1] : ray.org[2];
     }
-    return out;
 }
 
 }  // namespace packet

@@ -16,7 +16,7 @@ PACKET_INLINE void walk_mesh_directed(const TreeView& tree, const PreparedRays<N
     walk_tree<directions>(tree, ray, best.t, stats,
                           [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
                               stats.triangles(count(active) * static_cast<int>(item_count));
-                              leaf.meet(first, item_count, active);
+                              leaf.meet(BlockRange{first, item_count}, active);
                           });
 }
 
@@ -31,7 +31,8 @@ template <Query query, int N, class Isa, class Stats>
     const Mask<N, Isa> active = looking & usable(ray);
     if (none(active)) return;
     best.enter_instance(instance_id);
-    const PreparedRays<N, Isa> prepared = prepare(tree, ray, active.bits());
+    PreparedRays<N, Isa> prepared;
+    prepare(prepared, tree, ray, active.bits());
     const F kept = best.t;
     best.t = select(active, best.t, F(kNever));
     if (prepared.directions == Directions::kShared) {

@@ -14,7 +14,7 @@ template <Query query, class Isa, class Stats>
     walk_wide_tree<query, Isa>(tree, ray, best.t.r[0], stats,
                                [&](std::uint32_t first, std::uint32_t item_count) {
                                    stats.triangles(static_cast<int>(item_count));
-                                   leaf.meet(first, item_count);
+                                   leaf.meet(BlockRange{first, item_count});
                                });
 }
 
@@ -34,12 +34,12 @@ PACKET_INLINE void meet_instances(const SceneView& scene, const RayLanes<1, Isa>
     }
 }
 
-/// Lanes of rays as arrays, to pick single ones from.
-struct RayColumns {
+/// Lanes of rays in memory, to pick single ones from.
+struct StoredRays {
     float org[3][kSingleLanes], dir[3][kSingleLanes], tnear[kSingleLanes], tfar[kSingleLanes];
 
     template <class Isa>
-    PACKET_INLINE explicit RayColumns(const RayLanes<kSingleLanes, Isa>& ray) {
+    PACKET_INLINE explicit StoredRays(const RayLanes<kSingleLanes, Isa>& ray) {
         for (int a = 0; a < 3; ++a) ray.org[a].store(org[a]), ray.dir[a].store(dir[a]);
         ray.tnear.store(tnear), ray.tfar.store(tfar);
     }
@@ -58,20 +58,20 @@ template <Query query, class Isa, class Stats, class Found>
 PACKET_INLINE void walk_scene_singly(const SceneView& scene,
                                      const RayLanes<kSingleLanes, Isa>& rays, std::uint32_t active,
                                      Stats& stats, Found&& found) {
-    const RayColumns columns(rays);
+    const StoredRays stored(rays);
     const TreeView& tree = scene.is_single_mesh ? *scene.instances[0].tree : scene.top;
     PreparedLanes lanes;
     prepare_lanes(tree, rays, lanes);
     for (; active != 0; active &= active - 1) {
         const int i = __builtin_ctz(active);
         const SingleRay ray(lanes, i);
-        BestHits<1, Isa> best(columns.tfar[i], Mask<1, Isa>::from_bits(1));
+        BestHits<1, Isa> best(stored.tfar[i], Mask<1, Isa>::from_bits(1));
         if (tree.node_count == 0) {
         } else if (scene.is_single_mesh) {
             walk_mesh<query>(tree, ray, static_cast<std::int32_t>(scene.instances[0].instance_id),
                              best, stats);
         } else {
-            const RayLanes<1, Isa> world = columns.lane<Isa>(i);
+            const RayLanes<1, Isa> world = stored.lane<Isa>(i);
             walk_wide_tree<query, Isa>(
                 tree, ray, best.t.r[0], stats, [&](std::uint32_t first, std::uint32_t item_count) {
                     meet_instances<query>(scene, world, first, item_count, best, stats);

@@ -3,80 +3,133 @@
 
 #include "kernels/counters.h"
 #include "kernels/kernel_table.h"
-#include "kernels/scene_walk.h"
-#include "kernels/single_scene_walk.h"
+#include "kernels/tile_scene_walk.h"
 #include "kernels/triangle_box_axes.h"
 #include "kernels/triangle_box_clip.h"
 
 namespace packet {
 
-/// N rays transposed: one array a component, in the order of Ray's members. (RayPacket itself has
+/// Rays transposed: one array a component, in the order of Ray's members. (RayPacket itself has
 /// constructors, and a copy of those compiled for this ISA must not end up in the library.)
-template <int N, class Isa>
+template <int kCount, class Isa>
 struct RayArrays {
-    alignas(4 * N) float component[8][N];
+    alignas(64) float component[8][kCount];
 };
 
-/// N hits transposed. Bit i of `found`: lane i has one.
-template <int N, class Isa>
+/// Where the components of rays lie.
+struct RayColumns {
+    const float* component[8];
+
+    PACKET_INLINE RayColumns from(int lane) const {
+        RayColumns out;
+        for (int i = 0; i < 8; ++i) out.component[i] = component[i] + lane;
+        return out;
+    }
+};
+
+/// Hits transposed. A miss has t = inf and ids of -1.
+template <int kCount, class Isa>
 struct HitArrays {
-    float t[N], u[N], v[N];
-    std::int32_t prim_id[N], instance_id[N];
-    std::uint32_t found;
+    alignas(64) float t[kCount];
+    float u[kCount], v[kCount];
+    std::int32_t prim_id[kCount], instance_id[kCount];
 };
 
 /// Loads the lanes of `active`; the others become NaN, which takes part in nothing.
 template <int N, class Isa>
-PACKET_INLINE RayLanes<N, Isa> load_rays(const float* const (&component)[8], Mask<N, Isa> active) {
+PACKET_INLINE RayLanes<N, Isa> load_rays(const RayColumns& rays, Mask<N, Isa> active) {
     using F = Float<N, Isa>;
     const F nan(__builtin_nanf(""));
     F lanes[8];
-    for (int i = 0; i < 8; ++i) lanes[i] = select(active, F::load(component[i]), nan);
+    for (int i = 0; i < 8; ++i) lanes[i] = select(active, F::load(rays.component[i]), nan);
     return {{lanes[0], lanes[1], lanes[2]},
             {lanes[4], lanes[5], lanes[6]},
             max(F(-kLargestFloat), lanes[3]),  // NaN stays NaN
             lanes[7]};
 }
 
-template <int N, class Isa>
-PACKET_INLINE void store_hits(const BestHits<N, Isa>& best, HitArrays<N, Isa>& out) {
+template <int N, class Isa, int kCount>
+PACKET_INLINE void store_hits(const BestHits<N, Isa>& best, HitArrays<kCount, Isa>& out,
+                              int first) {
     using F = Float<N, Isa>;
     const Mask<N, Isa> found = best.found();
-    select(found, best.t, F(__builtin_huge_valf())).store(out.t);
-    best.u.store(out.u);
-    best.v.store(out.v);
-    select(found, best.prim_id, Int<N, Isa>(-1)).store(out.prim_id);
-    select(found, best.instance_id, Int<N, Isa>(-1)).store(out.instance_id);
-    out.found = found.bits();
+    select(found, best.t, F(__builtin_huge_valf())).store(out.t + first);
+    best.u.store(out.u + first);
+    best.v.store(out.v + first);
+    select(found, best.prim_id, Int<N, Isa>(-1)).store(out.prim_id + first);
+    select(found, best.instance_id, Int<N, Isa>(-1)).store(out.instance_id + first);
 }
 
-/// How a kernel's rays walk: one by one, or together.
-enum class Walk { kSingle, kPacket };
+/// The rays of a packet that are asked for and can hit anything.
+template <int N, class Isa>
+struct LoadedRays {
+    RayLanes<N, Isa> ray;
+    Mask<N, Isa> active;
 
-/// The lanes of `active_bits` trace; the others of `out` are of no meaning.
-template <Walk walk, Query query, int N, class Isa, class Stats>
-PACKET_INLINE void trace_lanes(const SceneView& scene, const float* const (&component)[8],
-                               std::uint32_t active_bits, Stats& stats, HitArrays<N, Isa>& out) {
-    const Mask<N, Isa> asked = Mask<N, Isa>::from_bits(active_bits);
-    const RayLanes<N, Isa> ray = load_rays(component, asked);
-    const Mask<N, Isa> active = asked & usable(ray);
-    BestHits<N, Isa> best(ray.tfar, active);
-    if constexpr (walk == Walk::kPacket) {
-        if (any(active)) walk_scene<query>(scene, ray, best, stats);
-        store_hits(best, out);
-    } else {
-        store_hits(best, out);  // all miss
-        if (none(active)) return;
-        walk_scene_singly<query>(scene, ray, active.bits(), stats,
-                                 [&](int lane, const BestHits<1, Isa>& one) {
-                                     if (none(one.found())) return;
-                                     out.found |= 1u << lane;
-                                     out.t[lane] = one.t.r[0];
-                                     out.u[lane] = one.u.r[0];
-                                     out.v[lane] = one.v.r[0];
-                                     out.prim_id[lane] = one.prim_id.r[0];
-                                     out.instance_id[lane] = one.instance_id.r[0];
-                                 });
+    PACKET_INLINE LoadedRays(const RayColumns& rays, std::uint32_t asked)
+        : ray(load_rays(rays, Mask<N, Isa>::from_bits(asked))),
+          active(Mask<N, Isa>::from_bits(asked) & usable(ray)) {}
+};
+
+template <Query query, int N, class Isa, int kCount, class Stats>
+PACKET_INLINE void trace_packet(const SceneView& scene, const RayColumns& rays, std::uint32_t asked,
+                                Stats& stats, HitArrays<kCount, Isa>& out, int first) {
+    const LoadedRays<N, Isa> loaded(rays.from(first), asked);
+    BestHits<N, Isa> best(loaded.ray.tfar, loaded.active);
+    if (any(loaded.active)) walk_scene<query>(scene, loaded.ray, best, stats);
+    store_hits(best, out, first);
+}
+
+/// The eight rays from `first` on.
+template <Query query, class Isa, int kCount, class Stats>
+PACKET_INLINE void trace_singly(const SceneView& scene, const RayColumns& rays, std::uint32_t asked,
+                                Stats& stats, HitArrays<kCount, Isa>& out, int first) {
+    const LoadedRays<kSingleLanes, Isa> loaded(rays.from(first), asked);
+    store_hits(BestHits<kSingleLanes, Isa>(loaded.ray.tfar, loaded.active), out, first);  // misses
+    if (none(loaded.active)) return;
+    walk_scene_singly<query>(
+        scene, loaded.ray, loaded.active.bits(), stats,
+        [&](int lane, const BestHits<1, Isa>& best) { store_hits(best, out, first + lane); });
+}
+
+/// The lanes of N that are among the first `count`, counted from lane `first`.
+template <int N>
+PACKET_INLINE std::uint32_t lanes_below(int count, int first) {
+    const int lanes = count - first;
+    return lanes <= 0  ? 0u
+           : lanes < N ? (1u << lanes) - 1
+                       : static_cast<std::uint32_t>((std::uint64_t{1} << N) - 1);
+}
+
+template <Query query, int N, class Isa, class Stats>
+PACKET_INLINE void trace_tile(const SceneView& scene, const RayColumns& rays, int count,
+                              Stats& stats, HitArrays<kTileRays, Isa>& out) {
+    const TreeView& tree = *scene.instances[0].tree;
+    const auto instance_id = static_cast<std::int32_t>(scene.instances[0].instance_id);
+    PreparedRays<N, Isa> prepared[kTilePackets<N>];
+    BestHits<N, Isa> best[kTilePackets<N>];
+    std::uint32_t active = 0;
+    for (int p = 0; p * N < count; ++p) {
+        const LoadedRays<N, Isa> loaded(rays.from(p * N), lanes_below<N>(count, p * N));
+        best[p].reset(loaded.ray.tfar, loaded.active);
+        if (none(loaded.active)) continue;
+        active |= 1u << p;
+        best[p].enter_instance(instance_id);
+        prepare(prepared[p], tree, loaded.ray, loaded.active.bits());
+    }
+    std::uint32_t done = 0;  // what has been traced singly is in `out`
+    const auto singly = [&](int p) {
+        done |= 1u << p;
+        for (int first = p * N; first < p * N + N; first += kSingleLanes) {
+            trace_singly<query>(scene, rays, lanes_below<kSingleLanes>(count, first), stats, out,
+                                first);
+        }
+    };
+    TileTracer<query, N, Isa, Stats, decltype(singly)> tracer{tree,   instance_id, prepared, best,
+                                                              active, stats,       singly};
+    tracer.trace(0, kTilePackets<N>);
+    for (int p = 0; p * N < count; ++p) {
+        if ((done >> p & 1u) == 0) store_hits(best[p], out, p * N);
     }
 }
 
@@ -90,62 +143,91 @@ PACKET_INLINE std::size_t place(const TraceBatch& batch, std::size_t i) {
     return batch.order != nullptr ? batch.order[i] : i;
 }
 
-template <int N, class Isa>
-PACKET_INLINE void gather_rays(const TraceBatch& batch, std::size_t begin, int lanes,
-                               RayArrays<N, Isa>& out) {
-    for (int i = 0; i < lanes; ++i) {
+template <int kCount, class Isa>
+PACKET_INLINE RayColumns gather_rays(const TraceBatch& batch, std::size_t begin, int count,
+                                     RayArrays<kCount, Isa>& out) {
+    for (int i = 0; i < count; ++i) {
         const Ray& ray = batch.rays[place(batch, begin + static_cast<std::size_t>(i))];
         out.component[0][i] = ray.org.x, out.component[1][i] = ray.org.y;
         out.component[2][i] = ray.org.z, out.component[3][i] = ray.tnear;
         out.component[4][i] = ray.dir.x, out.component[5][i] = ray.dir.y;
         out.component[6][i] = ray.dir.z, out.component[7][i] = ray.tfar;
     }
+    RayColumns columns;
+    for (int i = 0; i < 8; ++i) columns.component[i] = out.component[i];
+    return columns;
 }
 
-template <int N, class Isa>
-PACKET_INLINE void scatter_hits(const TraceBatch& batch, std::size_t begin, int lanes,
-                                const HitArrays<N, Isa>& hits) {
-    for (int i = 0; i < lanes; ++i) {
-        Hit& hit = batch.hits[place(batch, begin + static_cast<std::size_t>(i))];
-        hit.t = hits.t[i], hit.u = hits.u[i], hit.v = hits.v[i];
-        hit.prim_id = static_cast<std::uint32_t>(hits.prim_id[i]);
-        hit.mesh_id = mesh_of(*batch.scene, hits.instance_id[i]);
-        hit.instance_id = static_cast<std::uint32_t>(hits.instance_id[i]);
-    }
-}
-
-template <Walk walk, Query query, int N, class Isa, class Stats>
-void trace_batch(const TraceBatch& batch) noexcept {
-    Stats stats(batch.stats);
-    RayArrays<N, Isa> rays = {};
-    const float* const component[8] = {rays.component[0], rays.component[1], rays.component[2],
-                                       rays.component[3], rays.component[4], rays.component[5],
-                                       rays.component[6], rays.component[7]};
-    for (std::size_t begin = 0; begin < batch.count; begin += N) {
-        const std::size_t left = batch.count - begin;
-        const int lanes = left < N ? static_cast<int>(left) : N;
-        gather_rays(batch, begin, lanes, rays);
-        const std::uint32_t active = static_cast<std::uint32_t>((std::uint64_t{1} << lanes) - 1);
-        HitArrays<N, Isa> hits;
-        trace_lanes<walk, query>(*batch.scene, component, active, stats, hits);
+template <Query query, int kCount, class Isa>
+PACKET_INLINE void scatter_hits(const TraceBatch& batch, std::size_t begin, int count,
+                                const HitArrays<kCount, Isa>& hits) {
+    for (int i = 0; i < count; ++i) {
+        const std::size_t at = place(batch, begin + static_cast<std::size_t>(i));
         if constexpr (query == Query::kAny) {
-            for (int i = 0; i < lanes; ++i) {
-                batch.occluded[place(batch, begin + static_cast<std::size_t>(i))] =
-                    hits.found >> i & 1u;
-            }
+            batch.occluded[at] = hits.prim_id[i] >= 0;
         } else {
-            scatter_hits(batch, begin, lanes, hits);
+            Hit& hit = batch.hits[at];
+            hit.t = hits.t[i], hit.u = hits.u[i], hit.v = hits.v[i];
+            hit.prim_id = static_cast<std::uint32_t>(hits.prim_id[i]);
+            hit.mesh_id = mesh_of(*batch.scene, hits.instance_id[i]);
+            hit.instance_id = static_cast<std::uint32_t>(hits.instance_id[i]);
         }
     }
+}
+
+/// How the rays of a batch are traced: `kCount` at a time, by trace(rays, count, out).
+template <Query query, int kCount, class Isa, class Trace>
+PACKET_INLINE void trace_by(const TraceBatch& batch, Trace&& trace) {
+    RayArrays<kCount, Isa> rays = {};
+    HitArrays<kCount, Isa> hits;
+    for (std::size_t begin = 0; begin < batch.count; begin += kCount) {
+        const std::size_t left = batch.count - begin;
+        const int count = left < kCount ? static_cast<int>(left) : kCount;
+        const RayColumns columns = gather_rays(batch, begin, count, rays);
+        trace(columns, count, hits);
+        scatter_hits<query>(batch, begin, count, hits);
+    }
+}
+
+template <Query query, class Isa, class Stats>
+void trace_batch_singly(const TraceBatch& batch) noexcept {
+    Stats stats(batch.stats);
+    trace_by<query, kSingleLanes, Isa>(batch, [&](const RayColumns& rays, int count, auto& out) {
+        trace_singly<query>(*batch.scene, rays, lanes_below<kSingleLanes>(count, 0), stats, out, 0);
+    });
+}
+
+template <Query query, int N, class Isa, class Stats>
+void trace_batch_by_packets(const TraceBatch& batch) noexcept {
+    Stats stats(batch.stats);
+    trace_by<query, N, Isa>(batch, [&](const RayColumns& rays, int count, auto& out) {
+        trace_packet<query, N>(*batch.scene, rays, lanes_below<N>(count, 0), stats, out, 0);
+    });
+}
+
+template <Query query, class Isa, class Stats>
+void trace_batch_by_tiles(const TraceBatch& batch) noexcept {
+    constexpr int N = kTileLanes<Isa>;
+    Stats stats(batch.stats);
+    trace_by<query, kTileRays, Isa>(batch, [&](const RayColumns& rays, int count, auto& out) {
+        if (batch.scene->is_single_mesh) {
+            trace_tile<query, N>(*batch.scene, rays, count, stats, out);
+            return;
+        }
+        for (int first = 0; first < count; first += N) {
+            trace_packet<query, N>(*batch.scene, rays, lanes_below<N>(count, first), stats, out,
+                                   first);
+        }
+    });
 }
 
 template <Query query, int N, class Isa>
 PACKET_INLINE void trace_ray_packet(const SceneView& scene, const RayPacket<N>& rays,
                                     std::uint32_t active, HitArrays<N, Isa>& out) {
     NoCounters stats(nullptr);
-    const float* const component[8] = {rays.org_x, rays.org_y, rays.org_z, rays.tnear,
-                                       rays.dir_x, rays.dir_y, rays.dir_z, rays.tfar};
-    trace_lanes<Walk::kPacket, query>(scene, component, active, stats, out);
+    const RayColumns columns = {{rays.org_x, rays.org_y, rays.org_z, rays.tnear, rays.dir_x,
+                                 rays.dir_y, rays.dir_z, rays.tfar}};
+    trace_packet<query, N>(scene, columns, active, stats, out, 0);
 }
 
 template <int N, class Isa>
@@ -167,24 +249,29 @@ std::uint32_t any_packet(const SceneView& scene, const RayPacket<N>& rays,
                          std::uint32_t active) noexcept {
     HitArrays<N, Isa> hits;
     trace_ray_packet<Query::kAny>(scene, rays, active, hits);
-    return hits.found;
+    std::uint32_t found = 0;
+    for (; active != 0; active &= active - 1) {
+        const int i = __builtin_ctz(active);
+        found |= (hits.prim_id[i] >= 0 ? 1u : 0u) << i;
+    }
+    return found;
 }
 
 /// All kernels of an instruction set. Each isa_*.cpp fills one.
 template <class Isa>
 constexpr KernelTable make_kernel_table() {
     KernelTable table = {};
-    const auto fill = [&]<Walk walk, int N>(KernelTable::Width width) {
-        using KT = KernelTable;
-        table.closest[width][KT::kNotCounting] =
-            trace_batch<walk, Query::kClosest, N, Isa, NoCounters>;
-        table.closest[width][KT::kCounting] = trace_batch<walk, Query::kClosest, N, Isa, Counters>;
-        table.any[width][KT::kNotCounting] = trace_batch<walk, Query::kAny, N, Isa, NoCounters>;
-        table.any[width][KT::kCounting] = trace_batch<walk, Query::kAny, N, Isa, Counters>;
+    const auto fill = [&]<Query query, class Stats>(auto& kernels, KernelTable::Counting counting) {
+        kernels[KernelTable::kSingle][counting] = trace_batch_singly<query, Isa, Stats>;
+        kernels[KernelTable::kPacket8][counting] = trace_batch_by_packets<query, 8, Isa, Stats>;
+        kernels[KernelTable::kPacket16][counting] = trace_batch_by_packets<query, 16, Isa, Stats>;
+        kernels[KernelTable::kTile][counting] = trace_batch_by_tiles<query, Isa, Stats>;
     };
-    fill.template operator()<Walk::kSingle, kSingleLanes>(KernelTable::kWidth1);
-    fill.template operator()<Walk::kPacket, 8>(KernelTable::kWidth8);
-    fill.template operator()<Walk::kPacket, 16>(KernelTable::kWidth16);
+    using KT = KernelTable;
+    fill.template operator()<Query::kClosest, NoCounters>(table.closest, KT::kNotCounting);
+    fill.template operator()<Query::kClosest, Counters>(table.closest, KT::kCounting);
+    fill.template operator()<Query::kAny, NoCounters>(table.any, KT::kNotCounting);
+    fill.template operator()<Query::kAny, Counters>(table.any, KT::kCounting);
     table.closest8 = closest_packet<8, Isa>;
     table.closest16 = closest_packet<16, Isa>;
     table.any8 = any_packet<8, Isa>;

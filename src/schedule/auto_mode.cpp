@@ -36,7 +36,7 @@ Mode choose_mode(std::span<const Ray> rays, const Bounds3f& world) {
     for (std::size_t i = 0; i < runs; ++i) {
         coherent += is_coherent(rays.subspan(i * stride, kRunLength), diagonal);
     }
-    return 2 * coherent >= runs ? Mode::kPacket16 : Mode::kSingle;
+    return 2 * coherent >= runs ? Mode::kTile : Mode::kSingle;
 }
 
 }  // namespace packet

@@ -21,18 +21,25 @@ std::size_t PixelOrder::first_ray(std::size_t tile) const noexcept {
     return tile / tiles_x_ * kTileSize * width_;
 }
 
+/// The even bits of a Morton code.
+static std::size_t even_bits(std::size_t code) noexcept {
+    return (code & 1) | (code >> 1 & 2) | (code >> 2 & 4);
+}
+
 std::size_t PixelOrder::fill(std::size_t tile, Indices& out) const noexcept {
+    constexpr std::size_t kSquares = kTileSize / kSquareSize;
+    static_assert(kSquares == 8, "three bits a coordinate");
     const std::size_t x_begin = tile % tiles_x_ * kTileSize;
     const std::size_t x_end = std::min(x_begin + kTileSize, width_);
     const std::size_t rays_left = count_ - first_ray(tile);
     std::size_t filled = 0;
-    for (std::size_t sy = 0; sy < kTileSize; sy += kSquareSize) {
-        for (std::size_t sx = x_begin; sx < x_end; sx += kSquareSize) {
-            for (std::size_t y = sy; y < sy + kSquareSize; ++y) {
-                for (std::size_t x = sx; x < std::min(sx + kSquareSize, x_end); ++x) {
-                    const std::size_t ray = y * width_ + x;
-                    if (ray < rays_left) out[filled++] = static_cast<std::uint32_t>(ray);
-                }
+    for (std::size_t square = 0; square < kSquares * kSquares; ++square) {
+        const std::size_t x0 = x_begin + even_bits(square) * kSquareSize;
+        const std::size_t y0 = even_bits(square >> 1) * kSquareSize;
+        for (std::size_t y = y0; y < y0 + kSquareSize; ++y) {
+            for (std::size_t x = x0; x < std::min(x0 + kSquareSize, x_end); ++x) {
+                const std::size_t ray = y * width_ + x;
+                if (ray < rays_left) out[filled++] = static_cast<std::uint32_t>(ray);
             }
         }
     }

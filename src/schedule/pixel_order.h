@@ -1,5 +1,6 @@
-// The order in which an image's rays are traced if they come in scanline order: square tiles, and
-// in them squares of 4 x 4, so that a packet of 16 is such a square and one of 8 is half of it.
+// The order in which an image's rays are traced if they come in scanline order: square tiles, in
+// them squares of 4 x 4 along a Morton curve. So a packet of 16 is a square, one of 8 is half of
+// it, and 128 rays are a block of 16 x 8.
 #pragma once
 
 #include <array>

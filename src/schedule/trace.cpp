@@ -19,27 +19,30 @@ namespace packet {
 namespace {
 
 constexpr std::array kModeNames = {
-    ModeName{Mode::kAuto, "auto"},
-    ModeName{Mode::kSingle, "single"},
-    ModeName{Mode::kPacket8, "packet8"},
-    ModeName{Mode::kPacket16, "packet16"},
+    ModeName{Mode::kAuto, "auto"},       ModeName{Mode::kSingle, "single"},
+    ModeName{Mode::kPacket8, "packet8"}, ModeName{Mode::kPacket16, "packet16"},
+    ModeName{Mode::kTile, "tile"},
 };
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
 constexpr std::size_t kRaysPerTask = 512;
-// Where auto cannot tell by the rays' looks, it tries both ways on this many pairs of tasks,
-constexpr std::size_t kTrialPairs = 5;
+// What auto tries where there are rays enough. Packets of 8 never won by much.
+constexpr KernelTable::Kernel kContenders[] = {KernelTable::kSingle, KernelTable::kPacket16,
+                                               KernelTable::kTile};
+// It does so this many times, each time on neighbouring tasks,
+constexpr std::size_t kTrials = 5;
 // if that is so little of the whole that the slower tries do not count.
-constexpr std::size_t kLeastTasksForTrial = 128;
+constexpr std::size_t kLeastTasksForTrial = 192;
 
-KernelTable::Width width_of(Mode mode) {
+KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
-        case Mode::kPacket8: return KernelTable::kWidth8;
-        case Mode::kPacket16: return KernelTable::kWidth16;
+        case Mode::kPacket8: return KernelTable::kPacket8;
+        case Mode::kPacket16: return KernelTable::kPacket16;
+        case Mode::kTile: return KernelTable::kTile;
         case Mode::kAuto:
         case Mode::kSingle: break;
     }
-    return KernelTable::kWidth1;
+    return KernelTable::kSingle;
 }
 
 /// Rays cut into tasks: an image's into square tiles, others into runs.
@@ -76,7 +79,7 @@ private:
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
 public:
-    using Kernels = KernelTable::Batch[KernelTable::kWidthCount][KernelTable::kCountingCount];
+    using Kernels = KernelTable::Batch[KernelTable::kKernelCount][KernelTable::kCountingCount];
 
     SpanTrace(const Scene& scene, std::span<const Ray> rays, const TraceOptions& options)
         : scene_(scene.accel()),
@@ -89,45 +92,48 @@ public:
         }
         const bool is_auto = options.mode == Mode::kAuto;
         const Mode mode = is_auto ? choose_mode(rays, scene_.top.bounds) : options.mode;
-        width_ = width_of(mode);
-        tries_ = is_auto && mode == Mode::kSingle && tasks_.count() >= kLeastTasksForTrial;
+        kernel_ = kernel_of(mode);
+        tries_ = is_auto && tasks_.count() >= kLeastTasksForTrial;
     }
 
     void run(const Kernels& kernels, Hit* hits, std::uint8_t* occluded) const {
         const TraceBatch batch{&scene_.view, nullptr, nullptr, 0, hits, occluded, nullptr};
         const auto counting =
             options_.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
-        const auto kernel = [&](KernelTable::Width width) { return kernels[width][counting]; };
+        const auto kernel = [&](KernelTable::Kernel which) { return kernels[which][counting]; };
         parallel_.run([&] {
-            const KernelTable::Width width =
-                tries_ ? try_both(kernel(width_), kernel(KernelTable::kWidth16), batch) : width_;
+            const KernelTable::Kernel best = tries_ ? try_kernels(kernel, batch) : kernel_;
             parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
-                if (!is_trial(task)) run_task(task, kernel(width), batch);
+                if (!is_trial(task)) run_task(task, kernel(best), batch);
             });
         });
     }
 
 private:
-    /// Pairs of neighbouring tasks, spread over all: one is tried as single rays, one as packets.
-    [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrialPairs; }
+    /// Groups of neighbouring tasks, spread over all: each contender gets one of a group.
+    [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrials; }
     [[nodiscard]] bool is_trial(std::size_t task) const {
-        return tries_ && task % trial_stride() < 2 && task / trial_stride() < kTrialPairs;
+        return tries_ && task % trial_stride() < std::size(kContenders) &&
+               task / trial_stride() < kTrials;
     }
 
-    /// Traces the trial tasks and returns what was faster in most pairs: a vote, since one task
-    /// that the system interrupts must not decide. Their hits are as good as any.
-    [[nodiscard]] KernelTable::Width try_both(KernelTable::Batch single, KernelTable::Batch packets,
-                                              const TraceBatch& batch) const {
+    /// Traces the trial tasks and returns what was fastest most often: a vote, since one task that
+    /// the system interrupts must not decide. Their hits are as good as any.
+    template <class KernelOf>
+    [[nodiscard]] KernelTable::Kernel try_kernels(const KernelOf& kernel,
+                                                  const TraceBatch& batch) const {
         using Clock = std::chrono::steady_clock;
-        std::size_t won_by_packets = 0;
-        for (std::size_t pair = 0; pair < kTrialPairs; ++pair) {
-            const Clock::time_point start = Clock::now();
-            run_task(pair * trial_stride(), single, batch);
-            const Clock::time_point middle = Clock::now();
-            run_task(pair * trial_stride() + 1, packets, batch);
-            won_by_packets += Clock::now() - middle < middle - start;
+        std::array<int, std::size(kContenders)> won{};
+        for (std::size_t trial = 0; trial < kTrials; ++trial) {
+            std::array<Clock::duration, std::size(kContenders)> time;
+            for (std::size_t i = 0; i < std::size(kContenders); ++i) {
+                const Clock::time_point start = Clock::now();
+                run_task(trial * trial_stride() + i, kernel(kContenders[i]), batch);
+                time[i] = Clock::now() - start;
+            }
+            ++won[static_cast<std::size_t>(std::ranges::min_element(time) - time.begin())];
         }
-        return 2 * won_by_packets > kTrialPairs ? KernelTable::kWidth16 : KernelTable::kWidth1;
+        return kContenders[std::ranges::max_element(won) - won.begin()];
     }
 
     void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
@@ -146,8 +152,8 @@ private:
     Tasks tasks_;
     const TraceOptions& options_;
     Parallel parallel_;
-    KernelTable::Width width_;
-    bool tries_;  ///< whether to find the mode by trying
+    KernelTable::Kernel kernel_;
+    bool tries_;  ///< whether to find the kernel by trying
     mutable std::mutex stats_mutex_;
 };
 
@@ -203,14 +209,14 @@ void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uin
 Hit trace_closest(const Scene& scene, const Ray& ray) {
     Hit hit;
     const TraceBatch batch{&scene.accel().view, &ray, nullptr, 1, &hit, nullptr, nullptr};
-    select_kernels({}).closest[KernelTable::kWidth1][KernelTable::kNotCounting](batch);
+    select_kernels({}).closest[KernelTable::kSingle][KernelTable::kNotCounting](batch);
     return hit;
 }
 
 bool trace_any(const Scene& scene, const Ray& ray) {
     std::uint8_t occluded = 0;
     const TraceBatch batch{&scene.accel().view, &ray, nullptr, 1, nullptr, &occluded, nullptr};
-    select_kernels({}).any[KernelTable::kWidth1][KernelTable::kNotCounting](batch);
+    select_kernels({}).any[KernelTable::kSingle][KernelTable::kNotCounting](batch);
     return occluded != 0;
 }
 

@@ -1,0 +1,242 @@
+// A beam holds all rays of a tile: four lines in the planes of their longest axis bound where they
+// can be, whether or not they share an origin. It is tested instead of the rays, against eight
+// boxes or eight triangles at once, and never misses what one of the rays hits.
+//
+// Wald, Boulos, Shirley. Ray tracing deformable scenes using dynamic bounding volume hierarchies.
+// TOG 2007. Overbeck, Ramamoorthi, Mark. Large ray packets for real-time Whitted ray tracing. RT
+// 2008.
+#pragma once
+
+#include "kernels/best_hit.h"
+
+namespace packet {
+
+/// Whether the beam follows the lower or the upper bound of the rays, as sides of boxes are
+/// counted.
+enum BeamSide { kLower, kUpper, kBeamSides };
+
+/// What bounds the active lanes of some packets, before it is cast into the beam's shape.
+struct BeamBounds {
+    int axis[3];                  ///< the axes that become x, y, z, z being the longest
+    int near_side;                ///< the plane of z that rays meet first
+    float slope[2][kBeamSides];   ///< of x and y over z: the lines that bound them lower and upper
+    float offset[2][kBeamSides];  ///< x and y where these lines cross z = anchor
+    float anchor;                 ///< no ray begins before it, or none goes on behind it
+    float begin, end;             ///< of the rays, along z times its direction
+    float margin;                 ///< what rounding may come to, amply
+    bool is_sound;                ///< no ray looks back, and all numbers are finite
+
+    /// How wide the beam gets on a way along z.
+    [[nodiscard]] PACKET_INLINE float width(float way) const {
+        float widest = 0.0f;
+        for (int a = 0; a < 2; ++a) {
+            const float spread = __builtin_fabsf(slope[a][kUpper] - slope[a][kLower]);
+            const float width = offset[a][kUpper] - offset[a][kLower] + way * spread;
+            widest = widest < width ? width : widest;
+        }
+        return widest;
+    }
+};
+
+/// The lower and upper bound of active lanes.
+template <int N, class Isa>
+struct LaneBounds {
+    using F = Float<N, Isa>;
+    F lower = __builtin_huge_valf(), upper = -__builtin_huge_valf();
+
+    PACKET_INLINE void extend(Mask<N, Isa> active, const F& value) {
+        lower = min(lower, select(active, value, F(__builtin_huge_valf())));
+        upper = max(upper, select(active, value, F(-__builtin_huge_valf())));
+    }
+};
+
+template <int N, class Isa>
+PACKET_INLINE float smallest(const Float<N, Isa>& lanes) {
+    float value[N];
+    lanes.store(value);
+    for (int i = 1; i < N; ++i) value[0] = value[i] < value[0] ? value[i] : value[0];
+    return value[0];
+}
+template <int N, class Isa>
+PACKET_INLINE float largest(const Float<N, Isa>& lanes) {
+    return -smallest(Float<N, Isa>(0.0f) - lanes);
+}
+
+/// Bounds the active lanes (best.t > kNever) of packets that share their directions.
+template <int N, class Isa>
+class BeamBuilder {
+public:
+    using F = Float<N, Isa>;
+    using M = Mask<N, Isa>;
+
+    PACKET_INLINE BeamBuilder(const PreparedRays<N, Isa>* rays, const BestHits<N, Isa>* best,
+                              int packet_count)
+        : rays_(rays), best_(best), packet_count_(packet_count) {}
+
+    PACKET_INLINE BeamBounds build() {
+        BeamBounds out;
+        for (int a = 0; a < 3; ++a) out.axis[a] = rays_[0].shear.axis[a];
+        out.near_side = rays_[0].near_side[out.axis[2]];
+        const float sign = out.near_side == 0 ? 1.0f : -1.0f;
+        LaneBounds<N, Isa> slope[2], begin, end, tnear;
+        F first(__builtin_huge_valf()), margin(0.0f);
+        for (int p = 0; p < packet_count_; ++p) {
+            const PreparedRays<N, Isa>& ray = rays_[p];
+            const M active = is_active(p);
+            slope[0].extend(active, ray.shear.shear_x);
+            slope[1].extend(active, ray.shear.shear_y);
+            const F z = ray.shear.org[2] * F(sign), speed = abs(F(1.0f) / ray.shear.scale_z);
+            first = min(first, select(active, z, first));
+            tnear.extend(active, ray.tnear);
+            begin.extend(active, z + ray.tnear * speed);
+            end.extend(active, z + best_[p].t * speed);
+            for (int a = 0; a < 3; ++a) {
+                margin = max(margin, select(active, ray.org[0][a] - ray.org[1][a], margin));
+            }
+        }
+        // The difference of the grown origins is twice the growth, which bounds a hit's rounding.
+        out.margin = 4.0f * largest(margin);
+        out.begin = smallest(begin.lower), out.end = largest(end.upper);
+        anchor(out, slope, smallest(first) * sign, out.end * sign, sign);
+        out.is_sound = smallest(tnear.lower) >= 0.0f && extent(out) < kFarthest;  // false for NaN
+        return out;
+    }
+
+private:
+    static constexpr float kFarthest = 1e30f;
+
+    PACKET_INLINE M is_active(int packet) const { return best_[packet].t > F(kNever); }
+
+    struct Crossing {
+        float lower[2], upper[2];
+        PACKET_INLINE float spread() const { return upper[0] - lower[0] + (upper[1] - lower[1]); }
+    };
+    /// Where the rays cross a plane of z.
+    PACKET_INLINE Crossing cross(float plane) const {
+        LaneBounds<N, Isa> bounds[2];
+        for (int p = 0; p < packet_count_; ++p) {
+            const ShearRays<N, Isa>& shear = rays_[p].shear;
+            const F way = F(plane) - shear.org[2];
+            bounds[0].extend(is_active(p), shear.org[0] + shear.shear_x * way);
+            bounds[1].extend(is_active(p), shear.org[1] + shear.shear_y * way);
+        }
+        Crossing out;
+        for (int a = 0; a < 2; ++a) {
+            out.lower[a] = smallest(bounds[a].lower);
+            out.upper[a] = largest(bounds[a].upper);
+        }
+        return out;
+    }
+
+    /// Rays from an eye spread from their begin, rays to a light narrow to their end: the lines
+    /// start where the rays are closest. After the anchor it is the ray of least slope that is
+    /// lowest, before it that of greatest.
+    PACKET_INLINE void anchor(BeamBounds& out, const LaneBounds<N, Isa> (&slope)[2], float begin,
+                              float end, float sign) const {
+        Crossing crossing = cross(begin);
+        bool is_after = true;
+        out.anchor = begin;
+        if (out.end < kFarthest) {
+            const Crossing at_end = cross(end);
+            if (at_end.spread() < crossing.spread()) {
+                crossing = at_end;
+                is_after = false;
+                out.anchor = end;
+            }
+        }
+        const int lower = is_after == (sign > 0.0f) ? kLower : kUpper;
+        for (int a = 0; a < 2; ++a) {
+            out.slope[a][lower] = smallest(slope[a].lower);
+            out.slope[a][1 - lower] = largest(slope[a].upper);
+            out.offset[a][kLower] = crossing.lower[a];
+            out.offset[a][kUpper] = crossing.upper[a];
+        }
+    }
+
+    PACKET_INLINE static float extent(const BeamBounds& bounds) {
+        float out = __builtin_fabsf(bounds.anchor) + bounds.margin;
+        for (const auto& offset : bounds.offset) {
+            out += __builtin_fabsf(offset[kLower]) + __builtin_fabsf(offset[kUpper]);
+        }
+        return out;
+    }
+
+    const PreparedRays<N, Isa>* rays_;
+    const BestHits<N, Isa>* best_;
+    int packet_count_;
+};
+
+template <int N, class Isa>
+[[gnu::noinline]] BeamBounds bound_rays(const PreparedRays<N, Isa>* rays,
+                                        const BestHits<N, Isa>* best, int packet_count) {
+    return BeamBuilder<N, Isa>(rays, best, packet_count).build();
+}
+
+/// The beam in 8 lanes, for 8 boxes or triangles.
+template <class Isa>
+class Beam {
+public:
+    using F = Float<kWideSize, Isa>;
+    using M = Mask<kWideSize, Isa>;
+
+    PACKET_INLINE explicit Beam(const BeamBounds& bounds) {
+        for (int a = 0; a < 3; ++a) axis_[a] = bounds.axis[a];
+        near_side_ = bounds.near_side;
+        for (int a = 0; a < 2; ++a) {
+            for (int side = 0; side < kBeamSides; ++side) {
+                const float slope = bounds.slope[a][side];
+                const float outward = side == kLower ? -bounds.margin : bounds.margin;
+                slope_[a][side] = slope;
+                // x of the line is slope * z - start
+                start_[a][side] = slope * bounds.anchor - (bounds.offset[a][side] + outward);
+                // Of a box the plane of z where the line is most to the outside.
+                z_side_[a][side] = (slope >= 0.0f) == (side == kLower) ? 0 : 1;
+            }
+        }
+        constexpr float kRounding = 0x1p-20f;
+        sign_ = near_side_ == 0 ? 1.0f : -1.0f;
+        begin_ = bounds.begin - __builtin_fabsf(bounds.begin) * kRounding - bounds.margin;
+        end_ = bounds.end + __builtin_fabsf(bounds.end) * kRounding + bounds.margin;
+    }
+
+    /// The children whose boxes the beam may meet, and in `depth` where along its way.
+    PACKET_INLINE std::uint32_t meets(const WideNode& node, F& depth) const {
+        depth = F::load(node.plane[near_side_][axis_[2]]) * sign_;
+        const F far = F::load(node.plane[1 - near_side_][axis_[2]]) * sign_;
+        M hit = (depth <= end_) & (begin_ <= far);
+        for (int a = 0; a < 2; ++a) {
+            const auto line = [&](BeamSide side) {
+                const float* z = node.plane[z_side_[a][side]][axis_[2]];
+                return multiply_subtract(F::load(z), slope_[a][side], start_[a][side]);
+            };
+            hit = hit & (line(kLower) <= F::load(node.plane[1][axis_[a]])) &
+                  (F::load(node.plane[0][axis_[a]]) <= line(kUpper));
+        }
+        return hit.bits();
+    }
+
+    /// The triangles that are not all on the outside of one line.
+    PACKET_INLINE std::uint32_t meets(const TriangleBlock& block) const {
+        M outside = M::from_bits(0);
+        for (int a = 0; a < 2; ++a) {
+            F below, above;
+            for (int corner = 0; corner < 3; ++corner) {
+                const F x = F::load(block.v[corner][axis_[a]]);
+                const F z = F::load(block.v[corner][axis_[2]]);
+                const F lower = multiply_subtract(z, slope_[a][kLower], start_[a][kLower]) - x;
+                const F upper = multiply_subtract(z, slope_[a][kUpper], start_[a][kUpper]) - x;
+                below = corner == 0 ? lower : min(below, lower);
+                above = corner == 0 ? upper : max(above, upper);
+            }
+            outside = outside | (F(0.0f) < below) | (above < F(0.0f));
+        }
+        return (~outside).bits();
+    }
+
+private:
+    F slope_[2][kBeamSides], start_[2][kBeamSides];
+    F sign_, begin_, end_;
+    int axis_[3], near_side_, z_side_[2][kBeamSides];
+};
+
+}  // namespace packet

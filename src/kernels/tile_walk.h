@@ -1,0 +1,153 @@
+// Walks the 8-wide form of a tree with a tile: packets of rays in one beam. The beam rejects
+// children and triangles eight at a time; what it leaves is met by the packets, whose exact tests
+// leave a mask of those that are active below.
+//
+// Wald, Boulos, Shirley. Ray tracing deformable scenes using dynamic bounding volume hierarchies.
+// TOG 2007. Fuetterling, Lojewski, Pfreundt, Ebert. Efficient ray tracing kernels for modern CPU
+// architectures. JCGT 2015.
+#pragma once
+
+#include "kernels/beam.h"
+#include "kernels/box.h"
+#include "kernels/leaf.h"
+
+namespace packet {
+
+/// Rays of a tile.
+inline constexpr int kTileRays = 128;
+template <int N>
+inline constexpr int kTilePackets = kTileRays / N;
+/// Lanes of its packets: those of the widest register.
+template <class Isa>
+inline constexpr int kTileLanes = 8;
+template <>
+inline constexpr int kTileLanes<isa::Avx512> = 16;
+
+/// A child to visit, and the packets that have met its parent.
+struct TileEntry {
+    const WideNode* node;
+    std::uint32_t child;
+    std::uint32_t packets;
+    float depth;
+};
+
+/// The packets of a tile that walk together. Their directions are shared.
+template <Query query, int N, class Isa, class Stats>
+class TileWalk {
+public:
+    using F = Float<N, Isa>;
+    using M = Mask<N, Isa>;
+
+    PACKET_INLINE TileWalk(const TreeView& tree, const PreparedRays<N, Isa>* rays,
+                           BestHits<N, Isa>* best, const BeamBounds& bounds,
+                           std::int32_t instance_id, Stats& stats)
+        : tree_(tree),
+          rays_(rays),
+          best_(best),
+          beam_(bounds),
+          instance_id_(instance_id),
+          stats_(stats) {}
+
+    PACKET_INLINE void run(std::uint32_t packets) {
+        looking_ = packets;
+        const WideNode* node = tree_.wide_nodes;
+        for (;;) {
+            push_children(*node, packets);
+            do {
+                if (size_ == 0) return;
+                const TileEntry& top = stack_[--size_];
+                const WideChild child = top.node->child[top.child];
+                packets = active_packets(top);
+                if (packets == 0) continue;
+                node = &tree_.wide_nodes[child.link];
+                if (!child.is_leaf()) break;
+                meet_leaf({child.link, child.count}, packets);
+                if (looking_ == 0) return;
+                packets = 0;
+            } while (packets == 0);
+        }
+    }
+
+private:
+    /// Pushes the children that the beam meets, the nearest last.
+    PACKET_INLINE void push_children(const WideNode& node, std::uint32_t packets) {
+        Float<kWideSize, Isa> depths;
+        std::uint32_t bits = beam_.meets(node, depths);
+        float depth[kWideSize];
+        depths.store(depth);
+        const int bottom = size_;
+        for (; bits != 0; bits &= bits - 1) {
+            const int child = __builtin_ctz(bits);
+            int place = size_++;
+            for (; place > bottom && stack_[place - 1].depth < depth[child]; --place) {
+                stack_[place] = stack_[place - 1];
+            }
+            stack_[place] = {&node, static_cast<std::uint32_t>(child), packets, depth[child]};
+        }
+    }
+
+    /// The lanes of a packet that meet a child's box.
+    PACKET_INLINE M lanes(const WideNode& node, int child, int packet) const {
+        const PreparedRays<N, Isa>& ray = rays_[packet];
+        Interval<N, Isa> box;
+        for (int a = 0; a < 3; ++a) {
+            const int near = ray.near_side[a];
+            const F t_near = multiply_subtract(F(node.plane[near][a][child]), ray.inv_dir[a],
+                                               ray.shift[near][a]);
+            const F t_far = multiply_subtract(F(node.plane[1 - near][a][child]), ray.inv_dir[a],
+                                              ray.shift[1 - near][a]);
+            box.enter = a == 0 ? t_near : max(box.enter, t_near);
+            box.exit = a == 0 ? t_far : min(box.exit, t_far);
+        }
+        return meets(ray, box, best_[packet].t);
+    }
+
+    /// The packets that meet the child's box; in active_ their lanes that do.
+    PACKET_INLINE std::uint32_t active_packets(const TileEntry& entry) {
+        const int child = static_cast<int>(entry.child);
+        std::uint32_t out = 0;
+        for (std::uint32_t left = entry.packets & looking_; left != 0; left &= left - 1) {
+            const int p = __builtin_ctz(left);
+            const M active = lanes(*entry.node, child, p);
+            if (none(active)) continue;
+            active_[p] = active;
+            out |= 1u << p;
+            if (!entry.node->child[child].is_leaf()) stats_.visit(count(active), N);
+        }
+        return out;
+    }
+
+    PACKET_INLINE void meet_leaf(BlockRange range, std::uint32_t packets) {
+        for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
+            const TriangleBlock& block = tree_.blocks[b];
+            const std::uint32_t triangles = range.lanes(b) & beam_.meets(block);
+            if (triangles == 0) continue;
+            for (std::uint32_t left = packets; left != 0; left &= left - 1) {
+                const int p = __builtin_ctz(left);
+                stats_.triangles(count(active_[p]) * __builtin_popcount(triangles));
+                const PacketLeaf<query, Directions::kShared, N, Isa> leaf{tree_, rays_[p],
+                                                                          instance_id_, best_[p]};
+                leaf.meet(block, triangles, active_[p]);
+            }
+        }
+        if constexpr (query == Query::kAny) {
+            for (std::uint32_t left = packets; left != 0; left &= left - 1) {
+                const int p = __builtin_ctz(left);
+                if (none(best_[p].t > F(kNever))) looking_ &= ~(1u << p);
+            }
+        }
+    }
+
+    const TreeView& tree_;
+    const PreparedRays<N, Isa>* rays_;
+    BestHits<N, Isa>* best_;
+    Beam<Isa> beam_;
+    std::int32_t instance_id_;
+    Stats& stats_;
+    std::uint32_t looking_ = 0;  ///< packets that may still find something
+    M active_[kTilePackets<N>];
+    int size_ = 0;
+    TileEntry stack_[kMaxDepth * (kWideSize - 1) + kWideSize];
+};
+
+}  // namespace packet
