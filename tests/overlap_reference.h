@@ -114,11 +114,11 @@ bool overlap_in_integers(const IntegerPair<Int>& pair) {
         normal[a] = edge[0][b] * edge[1][c] - edge[0][c] * edge[1][b];
     }
     if (apart_along(pair, normal)) return false;
-    for (int k = 0; k < 3; ++k) {
+    for (const auto& side : edge) {
         for (int a = 0; a < 3; ++a) {
             Int axis[3] = {};
-            axis[(a + 1) % 3] = Int{} - edge[k][(a + 2) % 3];
-            axis[(a + 2) % 3] = edge[k][(a + 1) % 3];
+            axis[(a + 1) % 3] = Int{} - side[(a + 2) % 3];
+            axis[(a + 2) % 3] = side[(a + 1) % 3];
             if (apart_along(pair, axis)) return false;
         }
     }

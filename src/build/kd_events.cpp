@@ -64,12 +64,12 @@ void for_axes(std::size_t work, const Parallel& parallel, Fn fn) {
 
 /// How many events of each kind are at one position.
 struct Group {
-    float position = 0.0f;
+    float position;
     std::size_t count[3] = {0, 0, 0};
-    std::size_t next = 0;  ///< the first event behind
+    std::size_t next;  ///< the first event behind
 
-    Group(const std::vector<Event>& events, std::size_t first) : next(first) {
-        position = position_of(events[first]);
+    Group(const std::vector<Event>& events, std::size_t first)
+        : position(position_of(events[first])), next(first) {
         const Event end = (events[first] >> 32) + 1;
         for (; next < events.size() && events[next] >> 32 < end; ++next) {
             ++count[kind_of(events[next])];

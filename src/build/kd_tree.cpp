@@ -14,6 +14,7 @@
 #include <packet/error.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <memory>
@@ -32,7 +33,8 @@ constexpr std::size_t kMaxReferences = (std::size_t{1} << 31) - 2;
 struct Subtree {
     std::vector<BuildNode> nodes;
     AlignedVector<Reference> references;
-    std::unique_ptr<Subtree> child[2];  ///< both or none; then the root is all there is here
+    /// Both or none; then the root is all there is here.
+    std::array<std::unique_ptr<Subtree>, 2> child;
 };
 
 /// Puts the subtrees into one hierarchy, in depth-first order. Yields the root's index.

@@ -8,16 +8,16 @@
 
 namespace packet {
 
-static void append(TriangleMesh& out, const TriangleMesh& mesh, const glm::mat4x3& transform_) {
+static void append(TriangleMesh& out, const TriangleMesh& mesh, const glm::mat4x3& matrix) {
     const std::size_t offset = out.positions.size();
     if (offset + mesh.positions.size() > std::numeric_limits<std::uint32_t>::max()) {
         throw Error(
             ErrorCode::kTooLarge,
             "the flattened scene has more than 2^32 - 1 vertices, by mesh '" + mesh.name + "'");
     }
-    const bool moved = transform_ != glm::mat4x3(1.0f);
+    const bool moved = matrix != glm::mat4x3(1.0f);
     for (const glm::vec3& p : mesh.positions) {
-        out.positions.push_back(moved ? transform(transform_, p) : p);
+        out.positions.push_back(moved ? transform(matrix, p) : p);
     }
     for (const glm::uvec3& t : mesh.triangles) {
         out.triangles.push_back(t + static_cast<std::uint32_t>(offset));

@@ -27,11 +27,11 @@ void add_stats(BuildStats& sum, const BuildStats& tree) {
 void build_trees(std::span<const TriangleMesh> meshes, const BuildOptions& options,
                  SceneAccel& out) {
     std::size_t most_triangles = 0;
-    for (std::size_t i = 0; i < meshes.size(); ++i) {
-        out.trees.push_back(build_tree(meshes[i].view(), options));
+    for (const TriangleMesh& mesh : meshes) {
+        out.trees.push_back(build_tree(mesh.view(), options));
         add_stats(out.stats, out.trees.back().stats);
-        if (meshes[i].triangles.size() < most_triangles) continue;
-        most_triangles = meshes[i].triangles.size();
+        if (mesh.triangles.size() < most_triangles) continue;
+        most_triangles = mesh.triangles.size();
         out.stats.sah_cost = out.trees.back().stats.sah_cost;
     }
     for (const Tree& tree : out.trees) out.tree_views.push_back(tree.view());
