@@ -29,7 +29,7 @@ Bounds3f box_of(const Node& node) {
 /// Where cells may cut triangles, so that several leaves hold parts of one.
 bool cuts_triangles(AccelKind kind) {
     return kind == AccelKind::kKdMidpoint || kind == AccelKind::kKdMedian ||
-           kind == AccelKind::kKdSah;
+           kind == AccelKind::kKdSah || kind == AccelKind::kOctree;
 }
 
 /// Visits the whole tree; checks that boxes contain their children, and notes the box of the leaf
@@ -130,10 +130,12 @@ void for_each_accel(Fn fn) {
 
 std::vector<unsigned char> bytes_of(const Tree& tree) {
     const std::size_t node_bytes = tree.nodes.size() * sizeof(Node);
+    const std::size_t wide_bytes = tree.wide_nodes.size() * sizeof(WideNode);
     const std::size_t block_bytes = tree.blocks.size() * sizeof(TriangleBlock);
-    std::vector<unsigned char> out(node_bytes + block_bytes);
+    std::vector<unsigned char> out(node_bytes + wide_bytes + block_bytes);
     std::memcpy(out.data(), tree.nodes.data(), node_bytes);
-    std::memcpy(out.data() + node_bytes, tree.blocks.data(), block_bytes);
+    std::memcpy(out.data() + node_bytes, tree.wide_nodes.data(), wide_bytes);
+    std::memcpy(out.data() + node_bytes + wide_bytes, tree.blocks.data(), block_bytes);
     return out;
 }
 

@@ -3,6 +3,7 @@
 #include "build/bvh_morton.h"
 #include "build/bvh_sah.h"
 #include "build/kd_tree.h"
+#include "build/octree.h"
 #include "build/tree.h"
 #include "core/macros.h"
 #include "core/names.h"
@@ -21,6 +22,7 @@ static constexpr std::array kAccelNames = {
     AccelName{AccelKind::kKdMidpoint, "kd-midpoint"},
     AccelName{AccelKind::kKdMedian, "kd-median"},
     AccelName{AccelKind::kKdSah, "kd-sah"},
+    AccelName{AccelKind::kOctree, "octree"},
 };
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
@@ -46,6 +48,8 @@ static Hierarchy build_hierarchy(MeshView mesh, AlignedVector<Reference> referen
         case AccelKind::kKdMidpoint: return kd_tree(KdRule::kMidpoint);
         case AccelKind::kKdMedian: return kd_tree(KdRule::kMedian);
         case AccelKind::kKdSah: return kd_tree(KdRule::kSah);
+        case AccelKind::kOctree:
+            return build_octree(mesh, std::move(references), options, parallel);
         case AccelKind::kBvhMidpoint:
             return build_bvh_midpoint(std::move(references), options, parallel);
         case AccelKind::kBvhMorton:
