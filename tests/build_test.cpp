@@ -2,7 +2,7 @@
 #include "generate.h"
 #include "test_rays.h"
 
-#include "build/tree.h"
+#include "build/validate_tree.h"
 
 #include <doctest/doctest.h>
 
@@ -24,12 +24,6 @@ struct Walked {
 Bounds3f box_of(const Node& node) {
     return {{node.plane[0][0], node.plane[0][1], node.plane[0][2]},
             {node.plane[1][0], node.plane[1][1], node.plane[1][2]}};
-}
-
-/// Where cells may cut triangles, so that several leaves hold parts of one.
-bool cuts_triangles(AccelKind kind) {
-    return kind == AccelKind::kKdMidpoint || kind == AccelKind::kKdMedian ||
-           kind == AccelKind::kKdSah || kind == AccelKind::kOctree;
 }
 
 /// Visits the whole tree; checks that boxes contain their children, and notes the box of the leaf

@@ -5,6 +5,7 @@
 #include "build/kd_tree.h"
 #include "build/octree.h"
 #include "build/tree.h"
+#include "build/validate_tree.h"
 #include "core/macros.h"
 #include "core/names.h"
 
@@ -72,6 +73,7 @@ Tree build_tree(MeshView mesh, const BuildOptions& options) {
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();
+    PACKET_ASSERT((validate(tree, mesh, options.accel), true));  // throws, and says what is wrong
     return tree;
 }
 
