@@ -1,6 +1,6 @@
 // packet_micro: every mode by every instruction set on small generated scenes, with the work that a
-// ray takes. It answers why something is slow; packet_bench answers whether it is. And the parts of
-// builders that kernels serve.
+// ray takes. It answers why something is slow; packet_bench answers whether it is. And builders.
+#include "micro_build.h"
 #include "micro_overlap.h"
 
 #include <packet/isa.h>
@@ -100,6 +100,7 @@ int main(int argc, char** argv) {
             packet::bench::add_benchmarks(scene_kind, ray_kind);
         }
     }
+    packet::bench::add_build_benchmarks();
     packet::bench::add_overlap_benchmarks();
     benchmark::RunSpecifiedBenchmarks();
     benchmark::Shutdown();

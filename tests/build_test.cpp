@@ -2,7 +2,7 @@
 #include "generate.h"
 #include "test_rays.h"
 
-#include "build/tree.h"
+#include "build/validate_tree.h"
 
 #include <doctest/doctest.h>
 
@@ -24,12 +24,6 @@ struct Walked {
 Bounds3f box_of(const Node& node) {
     return {{node.plane[0][0], node.plane[0][1], node.plane[0][2]},
             {node.plane[1][0], node.plane[1][1], node.plane[1][2]}};
-}
-
-/// Where cells may cut triangles, so that several leaves hold parts of one.
-bool cuts_triangles(AccelKind kind) {
-    return kind == AccelKind::kKdMidpoint || kind == AccelKind::kKdMedian ||
-           kind == AccelKind::kKdSah;
 }
 
 /// Visits the whole tree; checks that boxes contain their children, and notes the box of the leaf
@@ -130,10 +124,12 @@ void for_each_accel(Fn fn) {
 
 std::vector<unsigned char> bytes_of(const Tree& tree) {
     const std::size_t node_bytes = tree.nodes.size() * sizeof(Node);
+    const std::size_t wide_bytes = tree.wide_nodes.size() * sizeof(WideNode);
     const std::size_t block_bytes = tree.blocks.size() * sizeof(TriangleBlock);
-    std::vector<unsigned char> out(node_bytes + block_bytes);
+    std::vector<unsigned char> out(node_bytes + wide_bytes + block_bytes);
     std::memcpy(out.data(), tree.nodes.data(), node_bytes);
-    std::memcpy(out.data() + node_bytes, tree.blocks.data(), block_bytes);
+    std::memcpy(out.data() + node_bytes, tree.wide_nodes.data(), wide_bytes);
+    std::memcpy(out.data() + node_bytes + wide_bytes, tree.blocks.data(), block_bytes);
     return out;
 }
 

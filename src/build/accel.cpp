@@ -3,7 +3,9 @@
 #include "build/bvh_morton.h"
 #include "build/bvh_sah.h"
 #include "build/kd_tree.h"
+#include "build/octree.h"
 #include "build/tree.h"
+#include "build/validate_tree.h"
 #include "core/macros.h"
 #include "core/names.h"
 
@@ -21,6 +23,7 @@ static constexpr std::array kAccelNames = {
     AccelName{AccelKind::kKdMidpoint, "kd-midpoint"},
     AccelName{AccelKind::kKdMedian, "kd-median"},
     AccelName{AccelKind::kKdSah, "kd-sah"},
+    AccelName{AccelKind::kOctree, "octree"},
 };
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
@@ -46,6 +49,8 @@ static Hierarchy build_hierarchy(MeshView mesh, AlignedVector<Reference> referen
         case AccelKind::kKdMidpoint: return kd_tree(KdRule::kMidpoint);
         case AccelKind::kKdMedian: return kd_tree(KdRule::kMedian);
         case AccelKind::kKdSah: return kd_tree(KdRule::kSah);
+        case AccelKind::kOctree:
+            return build_octree(mesh, std::move(references), options, parallel);
         case AccelKind::kBvhMidpoint:
             return build_bvh_midpoint(std::move(references), options, parallel);
         case AccelKind::kBvhMorton:
@@ -68,6 +73,7 @@ Tree build_tree(MeshView mesh, const BuildOptions& options) {
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();
+    PACKET_ASSERT((validate(tree, mesh, options.accel), true));  // throws, and says what is wrong
     return tree;
 }
 

@@ -1,14 +1,17 @@
-// A wide node's children are a cut through the binary tree below it. Dynamic programming finds the
-// best cuts: the cost of showing a subtree as a forest of at most k trees follows from those of its
-// two children with fewer.
+// A wide node's children are a cut through the binary tree below it. Some builders know their cuts.
+// For the others dynamic programming finds the best: the cost of showing a subtree as a forest of
+// at most k trees follows from those of its two children with fewer.
 //
 // Ylitie, Karras, Laine. Efficient incoherent ray traversal on GPUs through compressed wide BVHs.
 // High-Performance Graphics 2017.
 #include "build/collapse.h"
 
+#include "core/macros.h"
+
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace packet {
@@ -19,17 +22,30 @@ namespace {
 constexpr float kNodeCost = 1.0f;
 constexpr float kBlockCost = 1.0f;
 
-class Collapser {
+/// The children of a wide node, in order.
+struct Children {
+    std::uint32_t id[kWideSize];
+    int count = 0;
+};
+
+/// The cuts of least cost.
+class BestCuts {
 public:
-    Collapser(std::span<Node> nodes, std::uint32_t block_size)
+    BestCuts(std::span<const Node> nodes, std::uint32_t block_size)
         : nodes_(nodes), block_size_(block_size), costs_(nodes.size()) {
         // Children come after their parent in depth-first order: backwards is bottom-up.
         for (std::size_t i = nodes.size(); i-- > 0;) weigh(static_cast<std::uint32_t>(i));
     }
 
-    Collapsed run() {
-        if (!nodes_.empty()) emit(0);
-        return std::move(out_);
+    /// A subtree that becomes one child: a leaf if it has no children, or is cheaper so.
+    [[nodiscard]] bool is_leaf(std::uint32_t id) const {
+        return nodes_[id].is_leaf() || costs_[id].forest[0] == costs_[id].leaf;
+    }
+    [[nodiscard]] std::uint32_t item_count(std::uint32_t id) const { return costs_[id].items; }
+    [[nodiscard]] Children children(std::uint32_t id) const {
+        Children out;
+        gather_both(id, kWideSize, out);
+        return out;
     }
 
 private:
@@ -88,16 +104,6 @@ private:
         }
     }
 
-    /// A subtree that becomes one child: a leaf if it has no children, or is cheaper so.
-    [[nodiscard]] bool is_wide_leaf(std::uint32_t id) const {
-        return nodes_[id].is_leaf() || costs_[id].forest[0] == costs_[id].leaf;
-    }
-
-    struct Children {
-        std::uint32_t id[kWideSize];
-        int count = 0;
-    };
-
     /// Shows the subtree as at most `roots` trees, in order.
     void gather(std::uint32_t id, int roots, Children& out) const {
         const Cost& cost = costs_[id];
@@ -106,33 +112,82 @@ private:
             out.id[out.count++] = id;
             return;
         }
+        gather_both(id, roots, out);
+    }
+    void gather_both(std::uint32_t id, int roots, Children& out) const {
         const int first = best_cut(id, roots).first;
         gather(id + 1, first, out);
         gather(second(id), roots - first, out);
     }
 
+    std::span<const Node> nodes_;
+    std::uint32_t block_size_;
+    std::vector<Cost> costs_;
+};
+
+/// The cuts that a builder made.
+class GivenCuts {
+public:
+    GivenCuts(std::span<const Node> nodes, const std::vector<bool>& is_wide_child)
+        : nodes_(nodes), is_wide_child_(is_wide_child) {}
+
+    [[nodiscard]] bool is_leaf(std::uint32_t id) const { return nodes_[id].is_leaf(); }
+    [[nodiscard]] std::uint32_t item_count(std::uint32_t id) const { return nodes_[id].count; }
+    [[nodiscard]] Children children(std::uint32_t id) const {
+        Children out;
+        gather(id + 1, out);
+        gather(nodes_[id].link, out);
+        return out;
+    }
+
+private:
+    void gather(std::uint32_t id, Children& out) const {
+        if (is_wide_child_[id]) {
+            PACKET_ASSERT(out.count < kWideSize);
+            out.id[out.count++] = id;
+            return;
+        }
+        gather(id + 1, out);
+        gather(nodes_[id].link, out);
+    }
+
+    std::span<const Node> nodes_;
+    const std::vector<bool>& is_wide_child_;
+};
+
+/// Writes wide nodes, and places the items of their leaves.
+template <class Cuts>
+class Writer {
+public:
+    Writer(std::span<Node> nodes, std::uint32_t block_size, Cuts cuts)
+        : nodes_(nodes), block_size_(block_size), cuts_(std::move(cuts)) {}
+
+    Collapsed write() {
+        if (!nodes_.empty()) emit(0);
+        return std::move(out_);
+    }
+
+private:
     /// Appends the wide node of a subtree, and those below it, and returns its index.
     std::uint32_t emit(std::uint32_t id) {
         Children children;
-        if (is_wide_leaf(id)) {
+        if (cuts_.is_leaf(id)) {
             children.id[children.count++] = id;  // only the root: it is a node with one child
         } else {
-            const int first = best_cut(id, kWideSize).first;
-            gather(id + 1, first, children);
-            gather(second(id), kWideSize - first, children);
+            children = cuts_.children(id);
         }
         const auto index = static_cast<std::uint32_t>(out_.nodes.size());
         out_.nodes.push_back(empty_node());
         for (int i = 0; i < children.count; ++i) {
             const std::uint32_t child = children.id[i];
-            const bool leaf = is_wide_leaf(child);
+            const bool leaf = cuts_.is_leaf(child);
             const std::uint32_t link = leaf ? place_items(child) : emit(child);
             WideNode& node = out_.nodes[index];
             for (int a = 0; a < 3; ++a) {
                 node.plane[0][a][i] = nodes_[child].plane[0][a];
                 node.plane[1][a][i] = nodes_[child].plane[1][a];
             }
-            node.child[i] = {link, leaf ? costs_[child].items : 0};
+            node.child[i] = {link, leaf ? cuts_.item_count(child) : 0};
         }
         return index;
     }
@@ -141,7 +196,7 @@ private:
     std::uint32_t place_items(std::uint32_t id) {
         auto& items = out_.reference_of_item;
         const std::size_t used = items.size() % block_size_;
-        if (used != 0 && used + costs_[id].items > block_size_) {
+        if (used != 0 && used + cuts_.item_count(id) > block_size_) {
             items.insert(items.end(), block_size_ - used, kNoReference);
         }
         const auto first = static_cast<std::uint32_t>(items.size());
@@ -173,14 +228,17 @@ private:
 
     std::span<Node> nodes_;
     std::uint32_t block_size_;
-    std::vector<Cost> costs_;
+    Cuts cuts_;
     Collapsed out_;
 };
 
 }  // namespace
 
-Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size) {
-    return Collapser(nodes, block_size).run();
+Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size,
+                   const std::vector<bool>& is_wide_child) {
+    if (is_wide_child.empty())
+        return Writer(nodes, block_size, BestCuts(nodes, block_size)).write();
+    return Writer(nodes, block_size, GivenCuts(nodes, is_wide_child)).write();
 }
 
 }  // namespace packet

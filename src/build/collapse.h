@@ -4,6 +4,7 @@
 #include "build/tree.h"
 
 #include <span>
+#include <vector>
 
 namespace packet {
 
@@ -16,9 +17,11 @@ struct Collapsed {
 };
 
 /// Joins nodes into wide ones, and leaves into wide leaves of up to `block_size` items, so that the
-/// expected cost of a random ray is least; then places the items of each wide leaf so that it
-/// straddles as few blocks as it can. On entry the leaves of `nodes` link to references, on return
-/// to items. The order of items is that of the leaves. O(nodes).
-[[nodiscard]] Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size);
+/// expected cost of a random ray is least, or as `is_wide_child` says by node, if it is not empty;
+/// then places the items of each wide leaf so that it straddles as few blocks as it can. On entry
+/// the leaves of `nodes` link to references, on return to items. The order of items is that of the
+/// leaves. O(nodes).
+[[nodiscard]] Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size,
+                                 const std::vector<bool>& is_wide_child = {});
 
 }  // namespace packet

@@ -5,6 +5,7 @@
 #include "build/references.h"
 
 #include <cstdint>
+#include <vector>
 
 namespace packet {
 
@@ -16,11 +17,15 @@ struct BuildNode {
     std::uint32_t count = 0;
 
     [[nodiscard]] bool is_leaf() const noexcept { return count != 0; }
+    [[nodiscard]] std::uint32_t& child(int side) noexcept { return side == 0 ? first : second; }
 };
 
 struct Hierarchy {
     ScratchVector<BuildNode> nodes;  ///< nodes[0] is the root; unused slots are never referred to
     AlignedVector<Reference> references;
+    /// By node, whether it is a child in the 8-wide form, from builders that make that themselves:
+    /// the others only lie between children and parent. The root is one. Empty: collapse() chooses.
+    std::vector<bool> is_wide_child = {};
 };
 
 }  // namespace packet

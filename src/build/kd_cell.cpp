@@ -25,11 +25,6 @@ KdCost::KdCost(const KdCell& cell, const BuildOptions& options) noexcept {
     leaf_ = intersection_ * whole * static_cast<double>(cell.references.size());
 }
 
-static void add(KdCell& child, const Reference& r) {
-    child.references.push_back(r);
-    child.bounds.extend(r.bounds());
-}
-
 /// `side_of(i)` tells where reference i goes.
 template <class SideOf>
 static void deal_whole(const KdCell& cell, KdChildren& out, SideOf side_of) {
@@ -44,20 +39,13 @@ static void deal_whole(const KdCell& cell, KdChildren& out, SideOf side_of) {
         KdCell& child = out.cell[static_cast<std::size_t>(side)];
         out.places[i] =
             static_cast<KdPlace>(2 * child.references.size()) + static_cast<KdPlace>(side);
-        add(child, cell.references[i]);
+        child.add(cell.references[i]);
     }
     for (std::size_t s = 0; s < 2; ++s) out.whole[s] = out.cell[s].references.size();
 }
 
-/// What the cut has not used up, in proportion to the children's references.
-static void share_spare(const KdCell& cell, KdChildren& out) {
-    const std::size_t n0 = out.cell[0].references.size(), n1 = out.cell[1].references.size();
-    PACKET_ASSERT(n0 + n1 <= cell.references.size() + cell.spare);
-    const std::size_t left = cell.references.size() + cell.spare - (n0 + n1);
-    const double share =
-        static_cast<double>(n0) / static_cast<double>(std::max<std::size_t>(n0 + n1, 1));
-    out.cell[0].spare = std::min(left, static_cast<std::size_t>(share * static_cast<double>(left)));
-    out.cell[1].spare = left - out.cell[0].spare;
+static void inherit(const KdCell& cell, KdChildren& out) {
+    share_spare<KdCell>(cell, out.cell);
     for (KdCell& child : out.cell) child.depth = cell.depth + 1;
 }
 
@@ -69,10 +57,10 @@ KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane) {
         const CutReference cut =
             cut_reference(mesh, cell.references[i], plane.axis, plane.position);
         for (std::size_t s = 0; s < 2; ++s) {
-            if (!cut.side[s].bounds().empty()) add(out.cell[s], cut.side[s]);
+            if (!cut.side[s].bounds().empty()) out.cell[s].add(cut.side[s]);
         }
     }
-    share_spare(cell, out);
+    inherit(cell, out);
     return out;
 }
 
@@ -96,7 +84,7 @@ KdChildren halve_cell(const KdCell& cell) {
     for (std::size_t i = half; i < order.size(); ++i) side[order[i]] = 1;
     KdChildren out;
     deal_whole(cell, out, [&](std::size_t i) { return static_cast<int>(side[i]); });
-    share_spare(cell, out);
+    inherit(cell, out);
     return out;
 }
 

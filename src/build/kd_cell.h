@@ -2,7 +2,7 @@
 // a plane cuts it.
 #pragma once
 
-#include "build/references.h"
+#include "build/cell.h"
 
 #include <packet/accel.h>
 
@@ -16,12 +16,8 @@ namespace packet {
 /// says how they are stored.
 using EventLists = std::array<std::vector<std::uint64_t>, 3>;
 
-struct KdCell {
-    AlignedVector<Reference> references;  ///< boxes of the parts of triangles in this cell
-    Bounds3f bounds;                      ///< theirs: cells end where their contents do
-    EventLists events;                    ///< kd-sah only
-    std::size_t spare = 0;                ///< how many references cuts in here may add
-    int depth = 0;
+struct KdCell : Cell {
+    EventLists events;  ///< kd-sah only
 };
 
 /// Two sides have references; one that reaches to both is cut and counts on both.

@@ -8,16 +8,14 @@
 
 #include "build/kd_cell.h"
 #include "build/kd_events.h"
+#include "build/split.h"
+#include "build/subtree.h"
 #include "core/macros.h"
-#include "core/views.h"
 
 #include <packet/error.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <memory>
 #include <optional>
 
 namespace packet {
@@ -26,34 +24,6 @@ namespace {
 
 // Below this a task costs more than the work it moves to another core.
 constexpr std::size_t kTaskSize = 4096;
-// References are named by 31 bits; two values are kept for misses.
-constexpr std::size_t kMaxReferences = (std::size_t{1} << 31) - 2;
-
-/// What one task builds, as in Hierarchy. Nodes of tasks of their own hang on the root.
-struct Subtree {
-    std::vector<BuildNode> nodes;
-    AlignedVector<Reference> references;
-    /// Both or none; then the root is all there is here.
-    std::array<std::unique_ptr<Subtree>, 2> child;
-};
-
-/// Puts the subtrees into one hierarchy, in depth-first order. Yields the root's index.
-std::uint32_t append(Subtree& from, Hierarchy& to) {
-    const auto base = static_cast<std::uint32_t>(to.nodes.size());
-    const auto first = static_cast<std::uint32_t>(to.references.size());
-    for (BuildNode node : from.nodes) {
-        node.first += node.is_leaf() ? first : base;
-        node.second += base;
-        to.nodes.push_back(node);
-    }
-    to.references.insert(to.references.end(), from.references.begin(), from.references.end());
-    if (from.child[0] != nullptr) {
-        to.nodes[base].first = append(*from.child[0], to);
-        to.nodes[base].second = append(*from.child[1], to);
-    }
-    from = {};
-    return base;
-}
 
 class Builder {
 public:
@@ -67,11 +37,7 @@ public:
         // Wald and Havran: deeper cuts do not pay.
         max_cut_depth_ = std::min(kMaxDepth, static_cast<int>(8.0 + 1.3 * std::log2(n)));
         KdCell root;
-        const double allowed = std::min(n * static_cast<double>(options_.max_reference_factor),
-                                        static_cast<double>(max_references()));
-        root.spare = static_cast<std::size_t>(allowed) - references.size();
-        for (const Reference& r : references) root.bounds.extend(r.bounds());
-        root.references = std::move(references);
+        fill_root(root, std::move(references), options_, max_references());
         Subtree tree;
         parallel_.run([&] {
             if (rule_ == KdRule::kSah) root.events = make_events(root.references, parallel_);
@@ -87,25 +53,21 @@ public:
 
 private:
     void build_node(KdCell cell, Subtree& out) {
-        const std::size_t slot = out.nodes.size();
+        const auto slot = static_cast<std::uint32_t>(out.nodes.size());
         out.nodes.push_back({cell.bounds});
         const std::size_t count = cell.references.size();
         std::optional<KdChildren> children = divide(cell);
         if (!children) {
-            BuildNode& leaf = out.nodes[slot];
-            leaf.first = static_cast<std::uint32_t>(out.references.size());
-            leaf.count = static_cast<std::uint32_t>(count);
-            out.references.insert(out.references.end(), cell.references.begin(),
-                                  cell.references.end());
+            out.fill_leaf(slot, cell.references);
             return;
         }
         cell = {};  // it would otherwise stay while all below is built
         if (count > kTaskSize) {
             // Its parent was as large, so this is the root of its subtree.
             PACKET_ASSERT(slot == 0);
-            for (auto& child : out.child) child = std::make_unique<Subtree>();
-            parallel_.both([&] { build_node(std::move(children->cell[0]), *out.child[0]); },
-                           [&] { build_node(std::move(children->cell[1]), *out.child[1]); });
+            Subtree &tree0 = out.hang(slot, 0), &tree1 = out.hang(slot, 1);
+            parallel_.both([&] { build_node(std::move(children->cell[0]), tree0); },
+                           [&] { build_node(std::move(children->cell[1]), tree1); });
             return;
         }
         out.nodes[slot].first = static_cast<std::uint32_t>(out.nodes.size());
@@ -123,7 +85,7 @@ private:
             const bool is_small = count <= static_cast<std::size_t>(options_.max_leaf_size);
             if (!plane.is_cut() && is_small) return {};
             KdChildren children = plane.is_cut() ? cut_cell(mesh_, cell, plane) : halve_cell(cell);
-            if (!fits_depth(children)) {
+            if (!fit_depth(children)) {
                 if (is_small) return {};
                 children = halve_cell(cell);
             }
@@ -135,12 +97,9 @@ private:
         }
     }
 
-    /// Whether the larger child can still be halved down to one reference within kMaxDepth.
-    /// Halving keeps the condition, so by induction no leaf is deeper than that.
-    static bool fits_depth(const KdChildren& children) {
-        const std::size_t larger =
-            std::max(children.cell[0].references.size(), children.cell[1].references.size());
-        return children.cell[0].depth + static_cast<int>(std::bit_width(larger - 1)) <= kMaxDepth;
+    static bool fit_depth(const KdChildren& children) {
+        return fits_depth(children.cell[0].depth, std::max(children.cell[0].references.size(),
+                                                           children.cell[1].references.size()));
     }
 
     KdPlane find_plane(const KdCell& cell) const {

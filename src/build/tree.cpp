@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <limits>
 #include <span>
+#include <vector>
 
 namespace packet {
 
@@ -38,8 +39,9 @@ void count_node(const BuildNode& node, int depth, double root_area, const BuildO
                                               : static_cast<double>(options.traversal_cost));
 }
 
-/// The binary nodes, depth first. Iterative: small stacks of threads are not ours to fill.
-void linearize(const Hierarchy& hierarchy, const BuildOptions& options, Tree& tree) {
+/// The binary nodes, depth first. Yields which of them are wide children, if the builder says so.
+/// Iterative: small stacks of threads are not ours to fill.
+std::vector<bool> linearize(const Hierarchy& hierarchy, const BuildOptions& options, Tree& tree) {
     struct Pending {
         std::uint32_t source, parent;
         int depth;
@@ -47,6 +49,7 @@ void linearize(const Hierarchy& hierarchy, const BuildOptions& options, Tree& tr
     constexpr std::uint32_t kNoParent = 0xFFFFFFFF;
     const double root_area =
         std::max(static_cast<double>(tree.bounds.half_area()), std::numeric_limits<double>::min());
+    std::vector<bool> is_wide_child;
     std::vector<Pending> stack = {{0, kNoParent, 0}};
     while (!stack.empty()) {
         const Pending p = stack.back();
@@ -55,12 +58,16 @@ void linearize(const Hierarchy& hierarchy, const BuildOptions& options, Tree& tr
         const auto index = static_cast<std::uint32_t>(tree.nodes.size());
         if (p.parent != kNoParent) tree.nodes[p.parent].link = index;
         tree.nodes.push_back(make_node(source));
+        if (!hierarchy.is_wide_child.empty()) {
+            is_wide_child.push_back(hierarchy.is_wide_child[p.source]);
+        }
         count_node(source, p.depth, root_area, options, tree.stats);
         if (source.is_leaf()) continue;
         stack.push_back({source.second, index, p.depth + 1});
         stack.push_back({source.first, kNoParent, p.depth + 1});
     }
     tree.nodes.shrink_to_fit();
+    return is_wide_child;
 }
 
 /// Both forms of the tree, and where the references become items.
@@ -68,8 +75,8 @@ Collapsed make_nodes(const Hierarchy& hierarchy, const BuildOptions& options,
                      std::uint32_t block_size, Tree& tree) {
     if (hierarchy.references.empty()) return {};
     tree.bounds = hierarchy.nodes[0].bounds;
-    linearize(hierarchy, options, tree);
-    Collapsed collapsed = collapse(tree.nodes, block_size);
+    const std::vector<bool> is_wide_child = linearize(hierarchy, options, tree);
+    Collapsed collapsed = collapse(tree.nodes, block_size, is_wide_child);
     tree.wide_nodes = std::move(collapsed.nodes);
     tree.wide_nodes.shrink_to_fit();
     return collapsed;
@@ -152,6 +159,8 @@ void validate(const BuildOptions& options) {
           "BuildOptions::intersection_cost must be above 0, up to 1e6");
     check(options.max_reference_factor >= 1.0f && options.max_reference_factor <= 64.0f,
           "BuildOptions::max_reference_factor must be 1 to 64");
+    check(options.octree_levels >= 0 && options.octree_levels <= kMaxDepth / 3,
+          "BuildOptions::octree_levels must be 0 to 21");
     check(options.morton_bits == 0 || options.morton_bits == 30 || options.morton_bits == 63,
           "BuildOptions::morton_bits must be 0, 30 or 63");
 }

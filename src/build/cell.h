@@ -1,0 +1,74 @@
+// A cell of space while it is cut up, and what its parts inherit: for builders that cut triangles
+// along with space.
+#pragma once
+
+#include "build/references.h"
+#include "core/macros.h"
+
+#include <packet/accel.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+namespace packet {
+
+/// References are named by 31 bits; two values are kept for misses.
+inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 31) - 2;
+
+struct Cell {
+    AlignedVector<Reference> references;  ///< boxes of the parts of triangles in this cell
+    Bounds3f bounds;                      ///< theirs: cells end where their contents do
+    std::size_t spare = 0;                ///< how many references cuts in here may add
+    int depth = 0;
+
+    void add(const Reference& r) {
+        references.push_back(r);
+        bounds.extend(r.bounds());
+    }
+    void append(const Cell& other) {
+        references.insert(references.end(), other.references.begin(), other.references.end());
+        bounds.extend(other.bounds);
+    }
+};
+
+/// Fills in a cell that holds everything: cuts may make its references
+/// options.max_reference_factor times as many, up to `most`.
+inline void fill_root(Cell& root, AlignedVector<Reference> references, const BuildOptions& options,
+                      std::size_t most) {
+    const double allowed = std::min(
+        static_cast<double>(references.size()) * static_cast<double>(options.max_reference_factor),
+        static_cast<double>(most));
+    root.spare = static_cast<std::size_t>(allowed) - references.size();
+    for (const Reference& r : references) root.bounds.extend(r.bounds());
+    root.references = std::move(references);
+}
+
+/// Whether the parts of a cell have no more references together than they may.
+template <class Child>
+[[nodiscard]] bool is_within_spare(const Cell& cell, std::span<const Child> children) {
+    std::size_t count = 0;
+    for (const Child& child : children) count += child.references.size();
+    return count <= cell.references.size() + cell.spare;
+}
+
+/// What the cut has not used up is shared in proportion to the parts' references.
+template <class Child>
+void share_spare(const Cell& cell, std::span<Child> children) {
+    PACKET_ASSERT(is_within_spare(cell, std::span<const Child>(children)));
+    std::size_t count = 0;
+    for (const Child& child : children) count += child.references.size();
+    const std::size_t left = cell.references.size() + cell.spare - count;
+    std::size_t rest = left;
+    for (Child& child : children) {
+        const double share = static_cast<double>(child.references.size()) /
+                             static_cast<double>(std::max<std::size_t>(count, 1));
+        child.spare =
+            &child == &children.back()
+                ? rest
+                : std::min(rest, static_cast<std::size_t>(share * static_cast<double>(left)));
+        rest -= child.spare;
+    }
+}
+
+}  // namespace packet

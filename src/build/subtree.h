@@ -1,0 +1,57 @@
+// What one task builds of a hierarchy, where tasks do not know how much the others will build.
+#pragma once
+
+#include "build/hierarchy.h"
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace packet {
+
+/// As in Hierarchy, but for children that other tasks build.
+struct Subtree {
+    struct Hanging {
+        std::uint32_t parent;  ///< a node here
+        int side;              ///< which child of it
+        std::unique_ptr<Subtree> tree;
+    };
+    std::vector<BuildNode> nodes;  ///< nodes[0] is the root
+    AlignedVector<Reference> references;
+    std::vector<bool> is_wide_child;
+    std::vector<Hanging> hanging;
+
+    /// Makes a node a leaf of `items`.
+    void fill_leaf(std::uint32_t node, const AlignedVector<Reference>& items) {
+        nodes[node].first = static_cast<std::uint32_t>(references.size());
+        nodes[node].count = static_cast<std::uint32_t>(items.size());
+        references.insert(references.end(), items.begin(), items.end());
+    }
+    /// Hangs a subtree, yet to be filled, on a node.
+    Subtree& hang(std::uint32_t parent, int side) {
+        hanging.push_back({parent, side, std::make_unique<Subtree>()});
+        return *hanging.back().tree;
+    }
+};
+
+/// Moves a subtree and what hangs on it into the hierarchy. Yields the root's index there.
+inline std::uint32_t append(Subtree& from, Hierarchy& to) {
+    const auto base = static_cast<std::uint32_t>(to.nodes.size());
+    const auto first = static_cast<std::uint32_t>(to.references.size());
+    for (BuildNode node : from.nodes) {
+        node.first += node.is_leaf() ? first : base;
+        node.second += base;
+        to.nodes.push_back(node);
+    }
+    to.references.insert(to.references.end(), from.references.begin(), from.references.end());
+    to.is_wide_child.insert(to.is_wide_child.end(), from.is_wide_child.begin(),
+                            from.is_wide_child.end());
+    for (const Subtree::Hanging& hanging : from.hanging) {
+        const std::uint32_t root = append(*hanging.tree, to);
+        to.nodes[base + hanging.parent].child(hanging.side) = root;
+    }
+    from = {};
+    return base;
+}
+
+}  // namespace packet
