@@ -148,7 +148,7 @@ std::vector<Fault> faults_of_wide_nodes(const Tree& sound, const Places& at) {
         {"", [=](Tree& t) { ++leaf.count(t); }},
         {"", [=](Tree& t) { --leaf.count(t); }},
         {"wide node", [=](Tree& t) { absent.link(t) = 1; }},
-        {"wide node", [=](Tree& t) { absent.count(t) = 1; }},
+        {"wide node", [=](Tree& t) { absent.count(t) = 2; }},
         {named("wide node", sound.wide_nodes.size(), "has no parent before it"),
          [](Tree& t) { t.wide_nodes.push_back(t.wide_nodes.back()); }},
         {"wide node 0", [](Tree& t) { t.wide_nodes.clear(); }},

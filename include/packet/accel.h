@@ -18,7 +18,8 @@ enum class AccelKind : std::uint8_t {
     kKdMidpoint,   ///< k-d tree, cells cut in the middle, axes in turn
     kKdMedian,     ///< k-d tree, cells cut at the median of what they hold, axes in turn
     kKdSah,        ///< k-d tree, cells cut by the surface area heuristic
-    kOctree        ///< cubes cut into eight equal ones
+    kOctree,       ///< cubes cut into eight equal ones
+    kGrid          ///< uniform grid: equal cells, as many as the triangles are
 };
 
 struct BuildOptions {
@@ -30,13 +31,18 @@ struct BuildOptions {
     /// Cost of testing a triangle. Only its ratio to `traversal_cost` matters.
     float intersection_cost = 1.0f;
     /// References to triangles, at most, in multiples of the triangles, 1 to 64, where cells cut
-    /// triangles (k-d trees, octree). A part of the tree that has used up its share parts triangles without
-    /// cutting them. Lower it to save memory, 40 bytes a reference and while building about 250.
-    /// Doubling it lowers the SAH cost of generated scenes by 0 to 9%, mostly below 3%.
+    /// triangles (k-d trees, octree, grids). A part of the tree that has used up its share parts
+    /// triangles without cutting them. Lower it to save memory, 40 bytes a reference and while
+    /// building about 250. Doubling it lowers the SAH cost of generated scenes by 0 to 9%, mostly
+    /// below 3%.
     float max_reference_factor = 4.0f;
     /// Cells of an octree have sides of at least 2^-octree_levels of the scene's largest, 0 to 21.
     /// What is crowded in smaller ones is parted without cutting it. Lower it to save memory.
     int octree_levels = 21;
+    /// Cells of a grid, in multiples of the triangles, 1/64 to 64. More cells hold fewer triangles
+    /// each, cut more of them, and take more steps to cross. A grid gets fewer where it would else
+    /// exceed `max_reference_factor`.
+    float grid_density = 4.0f;
     /// Bits of Morton codes, for `kBvhMorton`: 30, 63, or 0 to choose by the number of triangles.
     /// 30 sort faster, 63 tell apart what is 2^-21 of the scene's extent from each other.
     int morton_bits = 0;

@@ -5,6 +5,7 @@
 #include "build/kd_tree.h"
 #include "build/octree.h"
 #include "build/tree.h"
+#include "build/uniform_grid.h"
 #include "build/validate_tree.h"
 #include "core/macros.h"
 #include "core/names.h"
@@ -24,6 +25,7 @@ static constexpr std::array kAccelNames = {
     AccelName{AccelKind::kKdMedian, "kd-median"},
     AccelName{AccelKind::kKdSah, "kd-sah"},
     AccelName{AccelKind::kOctree, "octree"},
+    AccelName{AccelKind::kGrid, "grid"},
 };
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
@@ -39,22 +41,26 @@ AccelKind parse_accel(std::string_view name) {
     return find_by_name(kAccelNames, name, "structure").kind;
 }
 
-static Hierarchy build_hierarchy(MeshView mesh, AlignedVector<Reference> references,
-                                 const BuildOptions& options, const Parallel& parallel) {
+static Tree build(MeshView mesh, AlignedVector<Reference> references, const BuildOptions& options,
+                  const Parallel& parallel) {
+    const auto tree = [&](const Hierarchy& hierarchy) {
+        return make_tree(hierarchy, mesh, options, parallel);
+    };
     const auto kd_tree = [&](KdRule rule) {
-        return build_kd_tree(rule, mesh, std::move(references), options, parallel);
+        return tree(build_kd_tree(rule, mesh, std::move(references), options, parallel));
     };
     switch (options.accel) {
-        case AccelKind::kBvh: return build_bvh_sah(std::move(references), options, parallel);
+        case AccelKind::kBvh: return tree(build_bvh_sah(std::move(references), options, parallel));
         case AccelKind::kKdMidpoint: return kd_tree(KdRule::kMidpoint);
         case AccelKind::kKdMedian: return kd_tree(KdRule::kMedian);
         case AccelKind::kKdSah: return kd_tree(KdRule::kSah);
         case AccelKind::kOctree:
-            return build_octree(mesh, std::move(references), options, parallel);
+            return tree(build_octree(mesh, std::move(references), options, parallel));
         case AccelKind::kBvhMidpoint:
-            return build_bvh_midpoint(std::move(references), options, parallel);
+            return tree(build_bvh_midpoint(std::move(references), options, parallel));
         case AccelKind::kBvhMorton:
-            return build_bvh_morton(std::move(references), options, parallel);
+            return tree(build_bvh_morton(std::move(references), options, parallel));
+        case AccelKind::kGrid: return build_uniform_grid(mesh, references, options, parallel);
     }
     PACKET_ASSERT(false && "an AccelKind that is not in the enumeration");
     return {};
@@ -68,8 +74,7 @@ Tree build_tree(MeshView mesh, const BuildOptions& options) {
     References references;
     parallel.run([&] { references = collect_references(mesh, parallel); });
     const SkippedTriangles skipped = references.skipped;
-    Tree tree = make_tree(build_hierarchy(mesh, std::move(references.items), options, parallel),
-                          mesh, options, parallel);
+    Tree tree = build(mesh, std::move(references.items), options, parallel);
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();

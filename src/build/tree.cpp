@@ -1,6 +1,7 @@
 #include "build/tree.h"
 
 #include "build/collapse.h"
+#include "build/triangle_block.h"
 
 #include <packet/error.h>
 
@@ -12,8 +13,6 @@
 namespace packet {
 
 namespace {
-
-constexpr glm::vec3 kNowhere(std::numeric_limits<float>::quiet_NaN());
 
 Node make_node(const BuildNode& source) {
     Node node = {};
@@ -90,17 +89,10 @@ std::size_t byte_count(const Tree& tree) {
 /// Stores the triangles of up to kBlockSize items; nothing hits the other lanes.
 void fill_block(TriangleBlock& block, std::span<const std::uint32_t> items, MeshView mesh,
                 std::span<const Reference> references) {
-    for (std::size_t lane = 0; lane < kBlockSize; ++lane) {
-        const bool is_used = lane < items.size() && items[lane] != kNoReference;
-        glm::vec3 corners[3] = {kNowhere, kNowhere, kNowhere};
-        block.prim_id[lane] = -1;
-        if (is_used) {
-            const std::uint32_t id = references[items[lane]].id;
-            for (int c = 0; c < 3; ++c) corners[c] = mesh.positions[mesh.triangles[id][c]];
-            block.prim_id[lane] = static_cast<std::int32_t>(id);
-        }
-        for (int c = 0; c < 3; ++c) {
-            for (int a = 0; a < 3; ++a) block.v[c][a][lane] = corners[c][a];
+    block = make_empty_block();
+    for (std::size_t lane = 0; lane < items.size(); ++lane) {
+        if (items[lane] != kNoReference) {
+            put_triangle(block, lane, mesh, references[items[lane]].id);
         }
     }
 }
@@ -112,8 +104,9 @@ TreeView Tree::view() const noexcept {
     out.nodes = nodes.data();
     out.wide_nodes = wide_nodes.data();
     out.blocks = blocks.data();
+    out.grid = grid.view();
     out.node_count = static_cast<std::uint32_t>(nodes.size());
-    for (int a = 0; a < 3 && !nodes.empty(); ++a) {
+    for (int a = 0; a < 3 && !out.is_empty(); ++a) {
         out.lower[a] = bounds.lower[a];
         out.upper[a] = bounds.upper[a];
     }
@@ -161,6 +154,8 @@ void validate(const BuildOptions& options) {
           "BuildOptions::max_reference_factor must be 1 to 64");
     check(options.octree_levels >= 0 && options.octree_levels <= kMaxDepth / 3,
           "BuildOptions::octree_levels must be 0 to 21");
+    check(options.grid_density >= 1.0f / 64.0f && options.grid_density <= 64.0f,
+          "BuildOptions::grid_density must be 1/64 to 64");
     check(options.morton_bits == 0 || options.morton_bits == 30 || options.morton_bits == 63,
           "BuildOptions::morton_bits must be 0, 30 or 63");
 }

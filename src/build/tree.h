@@ -2,6 +2,7 @@
 // there.
 #pragma once
 
+#include "build/grid.h"
 #include "build/hierarchy.h"
 #include "core/views.h"
 
@@ -9,11 +10,12 @@
 
 namespace packet {
 
-/// Owns what a TreeView shows.
+/// Owns what a TreeView shows: a tree, or a grid.
 struct Tree {
     AlignedVector<Node> nodes;
     AlignedVector<WideNode> wide_nodes;
     ScratchVector<TriangleBlock> blocks;
+    Grid grid;  ///< empty but for grids
     Bounds3f bounds;
     BuildStats stats;
 

@@ -6,6 +6,7 @@
 #include <packet/error.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -74,6 +75,7 @@ public:
             for (std::uint32_t i = 0; i < tree_.nodes.size(); ++i) check_node(i);
             check_wide_nodes();
         }
+        check_cells();
         for (std::size_t i = 0; i < leaf_of_item_.size(); ++i) check_item(i);
         for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) check_triangle(i);
     }
@@ -126,30 +128,71 @@ private:
             }
             return;
         }
-        require(node.link <= leaf_of_item_.size() && node.count <= leaf_of_item_.size() - node.link,
-                "node", index, "refers to items that are not there");
-        for (std::uint32_t item = node.link; item < node.link + node.count; ++item) {
-            require(leaf_of_item_[item] == kNone, "node", index, "holds an item of another leaf");
+        hold_items("node", index, box, node.link, node.count);
+    }
+
+    /// A leaf, or a cell, holds `count` items.
+    void hold_items(const char* what, std::uint32_t index, const Bounds3f& box, std::uint32_t first,
+                    std::uint32_t count) {
+        require(first <= leaf_of_item_.size() && count <= leaf_of_item_.size() - first, what, index,
+                "refers to items that are not there");
+        for (std::uint32_t item = first; item < first + count; ++item) {
+            require(leaf_of_item_[item] == kNone, what, index, "holds an item of another leaf");
             leaf_of_item_[item] = index;
             const std::int32_t id = tree_.blocks[item / kBlockSize].prim_id[item % kBlockSize];
             require(id >= 0 && static_cast<std::size_t>(id) < mesh_.triangles.size(), "item", item,
                     "its prim_id is not one of the mesh");
             ++leaves_of_triangle_[static_cast<std::size_t>(id)];
-            check_held(box, static_cast<std::uint32_t>(id), index);
+            check_held(what, index, box, static_cast<std::uint32_t>(id));
         }
     }
 
-    void check_held(const Bounds3f& box, std::uint32_t id, std::uint32_t index) const {
+    /// Each cell's triangles overlap it, and brick after brick the cells are all there.
+    void check_cells() {
+        const Grid& grid = tree_.grid;
+        std::size_t next = 0;
+        for (std::size_t brick = 0; brick < grid.bricks.size(); ++brick) {
+            const GridBrick& cells = grid.bricks[brick];
+            if (cells.occupied == 0) continue;
+            require(cells.first_cell == next, "brick", brick,
+                    "its cells are not behind the last's");
+            for (std::uint64_t left = cells.occupied; left != 0; left &= left - 1, ++next) {
+                require(next < grid.cells.size(), "brick", brick, "its cells are not there");
+                const GridCell& cell = grid.cells[next];
+                require(cell.count != 0, "cell", next, "is empty");
+                hold_items("cell", static_cast<std::uint32_t>(next),
+                           box_of_cell(grid, brick, std::countr_zero(left)), cell.first,
+                           cell.count);
+            }
+        }
+        require(next == grid.cells.size(), "cell", next, "belongs to no brick");
+    }
+
+    static Bounds3f box_of_cell(const Grid& grid, std::size_t brick, int bit) {
+        Bounds3f box;
+        for (int a = 0; a < 3; ++a) {
+            const auto bricks = static_cast<std::size_t>(grid.brick_count[a]);
+            const std::size_t place =
+                brick % bricks * kBrickSide + (static_cast<std::size_t>(bit) >> 2 * a & 3);
+            box.lower[a] = grid.planes[a][place];
+            box.upper[a] = grid.planes[a][place + 1];
+            brick /= bricks;
+        }
+        return box;
+    }
+
+    void check_held(const char* what, std::uint32_t index, const Bounds3f& box,
+                    std::uint32_t id) const {
         const glm::uvec3 t = mesh_.triangles[id];
         const glm::vec3 corners[3] = {mesh_.positions[t.x], mesh_.positions[t.y],
                                       mesh_.positions[t.z]};
         if (cuts_) {
-            require(overlaps_by_axes(corners, grown(box, corners)), "node", index,
+            require(overlaps_by_axes(corners, grown(box, corners)), what, index,
                     "its box does not overlap a triangle it holds");
             return;
         }
         for (const glm::vec3& p : corners) {
-            require(box.contains({p, p}), "node", index, "its box does not hold its triangles");
+            require(box.contains({p, p}), what, index, "its box does not hold its triangles");
         }
     }
 
@@ -259,7 +302,8 @@ bool cuts_triangles(AccelKind kind) noexcept {
         case AccelKind::kKdMidpoint:
         case AccelKind::kKdMedian:
         case AccelKind::kKdSah:
-        case AccelKind::kOctree: return true;
+        case AccelKind::kOctree:
+        case AccelKind::kGrid: return true;
     }
     return false;
 }

@@ -56,19 +56,63 @@ struct alignas(32) TriangleBlock {
 };
 static_assert(sizeof(TriangleBlock) == 320 && std::is_trivially_copyable_v<TriangleBlock>);
 
-/// A tree. Items of leaves are triangles (item i is lane i % 8 of block i / 8) or instances.
+/// Cells along each side of a brick: a brick's 64 cells have a bit each in one word.
+inline constexpr int kBrickSide = 4;
+
+/// A brick of a grid's cells. Cell (x, y, z) of it is bit x + 4 y + 16 z.
+struct GridBrick {
+    std::uint64_t occupied;    ///< the cells that hold something
+    std::uint32_t first_cell;  ///< where these are in GridView::cells, in the order of their bits
+    std::uint32_t unused;
+};
+static_assert(sizeof(GridBrick) == 16 && std::is_trivially_copyable_v<GridBrick>);
+
+/// A cell that holds something: items `first` to `first + count`; or, if `count` is 0, what
+/// GridView::trees[first] says.
+struct GridCell {
+    std::uint32_t first, count;
+};
+static_assert(sizeof(GridCell) == 8 && std::is_trivially_copyable_v<GridCell>);
+
+/// Where a cell's tree begins in the arrays of the TreeView. Its links and items count from here.
+struct GridTree {
+    std::uint32_t node, wide_node, block;
+};
+
+/// A uniform grid over the box of a mesh. Empty cells cost two bits, others 8 bytes more.
+struct GridView {
+    /// Along each axis the planes between cells, ascending, 4 bricks + 1. The first and the last
+    /// are faces of the box; bricks are filled up with cells that are flat and hold nothing.
+    const float* planes[3] = {nullptr, nullptr, nullptr};
+    std::int32_t brick_count[3] = {0, 0, 0};
+    float bricks_per_unit[3] = {0, 0, 0};  ///< about: where to start looking for a brick
+    const GridBrick* bricks = nullptr;     ///< x fastest, z slowest; null: there is no grid
+    const GridCell* cells = nullptr;
+    const GridTree* trees = nullptr;
+};
+
+/// A tree, or a grid. Items of leaves are triangles (item i is lane i % 8 of block i / 8) or
+/// instances.
 struct TreeView {
     const Node* nodes = nullptr;
     const WideNode* wide_nodes = nullptr;
     const TriangleBlock* blocks = nullptr;
-    std::uint32_t node_count = 0;  ///< 0: nothing to hit
-    float lower[3] = {0, 0, 0};    ///< the box of all items
+    std::uint32_t node_count = 0;
+    GridView grid;               ///< if there is one, rays start in it; its cells may hold trees
+    float lower[3] = {0, 0, 0};  ///< the box of all items
     float upper[3] = {0, 0, 0};
     /// Boxes are taken as grown by slack * (max |corner of the tree's box - org| + reach) and an
     /// ulp of org. This covers all rounding on the way to a hit: no box that holds one is ever
     /// missed.
     float slack = kBoxSlack;
     float reach = 0.0f;
+
+    [[nodiscard]] bool is_tree() const noexcept {
+        return node_count != 0 && grid.bricks == nullptr;
+    }
+    [[nodiscard]] bool is_empty() const noexcept {
+        return node_count == 0 && grid.bricks == nullptr;
+    }
 };
 
 /// A mesh placed in the world.

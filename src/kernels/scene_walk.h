@@ -3,6 +3,8 @@
 // walked directly.
 #pragma once
 
+#include "kernels/grid_packet.h"
+#include "kernels/grid_walk.h"
 #include "kernels/leaf.h"
 #include "kernels/packet_walk.h"
 
@@ -26,7 +28,7 @@ template <Query query, int N, class Isa, class Stats>
 [[gnu::noinline]] void walk_mesh(const TreeView& tree, const RayLanes<N, Isa>& ray,
                                  std::int32_t instance_id, BestHits<N, Isa>& best, Stats& stats) {
     using F = Float<N, Isa>;
-    if (tree.node_count == 0) return;
+    if (tree.is_empty()) return;
     const Mask<N, Isa> looking = best.t > F(kNever);
     const Mask<N, Isa> active = looking & usable(ray);
     if (none(active)) return;
@@ -35,7 +37,9 @@ template <Query query, int N, class Isa, class Stats>
     prepare(prepared, tree, ray, active.bits());
     const F kept = best.t;
     best.t = select(active, best.t, F(kNever));
-    if (prepared.directions == Directions::kShared) {
+    if (tree.grid.bricks != nullptr) {
+        walk_grid<query>(tree, ray, prepared, active, instance_id, best, stats);
+    } else if (prepared.directions == Directions::kShared) {
         walk_mesh_directed<query, Directions::kShared>(tree, prepared, instance_id, best, stats);
     } else {
         walk_mesh_directed<query, Directions::kMixed>(tree, prepared, instance_id, best, stats);

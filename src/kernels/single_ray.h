@@ -48,6 +48,25 @@ PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLan
     }
 }
 
+/// The lanes of a packet, some at a time.
+template <int N, class Isa>
+PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<N, Isa>& ray,
+                                 PreparedLanes (&out)[N / kSingleLanes]) {
+    using Some = Float<kSingleLanes, Isa>;
+    float org[3][N], dir[3][N], tnear[N], tfar[N];
+    for (int a = 0; a < 3; ++a) ray.org[a].store(org[a]), ray.dir[a].store(dir[a]);
+    ray.tnear.store(tnear), ray.tfar.store(tfar);
+    for (int first = 0; first < N; first += kSingleLanes) {
+        RayLanes<kSingleLanes, Isa> some;
+        for (int a = 0; a < 3; ++a) {
+            some.org[a] = Some::load(org[a] + first);
+            some.dir[a] = Some::load(dir[a] + first);
+        }
+        some.tnear = Some::load(tnear + first), some.tfar = Some::load(tfar + first);
+        prepare_lanes(tree, some, out[first / kSingleLanes]);
+    }
+}
+
 /// One ray in all lanes.
 template <class Isa>
 PACKET_INLINE RayLanes<kSingleLanes, Isa> broadcast(const RayLanes<1, Isa>& ray) {

@@ -1,6 +1,7 @@
 // Walks a scene with single rays, as scene_walk.h does with packets.
 #pragma once
 
+#include "kernels/grid_walk.h"
 #include "kernels/leaf.h"
 #include "kernels/single_walk.h"
 
@@ -10,6 +11,10 @@ template <Query query, class Isa, class Stats>
 [[gnu::noinline]] void walk_mesh(const TreeView& tree, const SingleRay& ray,
                                  std::int32_t instance_id, BestHits<1, Isa>& best, Stats& stats) {
     best.enter_instance(instance_id);
+    if (tree.grid.bricks != nullptr) {
+        walk_grid<query>(tree, ray, kNever, instance_id, best, stats);
+        return;
+    }
     const SingleLeaf<query, Isa> leaf{tree, ray, instance_id, best};
     walk_wide_tree<query, Isa>(tree, ray, best.t.r[0], stats,
                                [&](std::uint32_t first, std::uint32_t item_count) {
@@ -26,7 +31,7 @@ PACKET_INLINE void meet_instances(const SceneView& scene, const RayLanes<1, Isa>
     for (std::uint32_t i = first; i < first + item_count && best.t.r[0] != kNever; ++i) {
         const InstanceView& instance = scene.instances[i];
         const RayLanes<1, Isa> moved = to_object(instance, ray);
-        if (instance.tree->node_count == 0 || none(usable(moved))) continue;
+        if (instance.tree->is_empty() || none(usable(moved))) continue;
         PreparedLanes lanes;
         prepare_lanes(*instance.tree, broadcast(moved), lanes);
         walk_mesh<query>(*instance.tree, SingleRay(lanes, 0),
@@ -58,16 +63,16 @@ template <Query query, class Isa, class Stats, class Found>
 PACKET_INLINE void walk_scene_singly(const SceneView& scene,
                                      const RayLanes<kSingleLanes, Isa>& rays, std::uint32_t active,
                                      Stats& stats, Found&& found) {
-    const StoredRays stored(rays);
     const TreeView& tree = scene.is_single_mesh ? *scene.instances[0].tree : scene.top;
+    if (tree.is_empty()) return;
+    const StoredRays stored(rays);
     PreparedLanes lanes;
     prepare_lanes(tree, rays, lanes);
     for (; active != 0; active &= active - 1) {
         const int i = __builtin_ctz(active);
         const SingleRay ray(lanes, i);
         BestHits<1, Isa> best(stored.tfar[i], Mask<1, Isa>::from_bits(1));
-        if (tree.node_count == 0) {
-        } else if (scene.is_single_mesh) {
+        if (scene.is_single_mesh) {
             walk_mesh<query>(tree, ray, static_cast<std::int32_t>(scene.instances[0].instance_id),
                              best, stats);
         } else {

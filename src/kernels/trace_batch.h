@@ -210,13 +210,13 @@ void trace_batch_by_tiles(const TraceBatch& batch) noexcept {
     constexpr int N = kTileLanes<Isa>;
     Stats stats(batch.stats);
     trace_by<query, kTileRays, Isa>(batch, [&](const RayColumns& rays, int count, auto& out) {
-        if (batch.scene->is_single_mesh) {
-            trace_tile<query, N>(*batch.scene, rays, count, stats, out);
+        const SceneView& scene = *batch.scene;
+        if (scene.is_single_mesh && scene.instances[0].tree->is_tree()) {
+            trace_tile<query, N>(scene, rays, count, stats, out);
             return;
         }
         for (int first = 0; first < count; first += N) {
-            trace_packet<query, N>(*batch.scene, rays, lanes_below<N>(count, first), stats, out,
-                                   first);
+            trace_packet<query, N>(scene, rays, lanes_below<N>(count, first), stats, out, first);
         }
     });
 }
