@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string_view>
 
@@ -30,9 +31,9 @@ struct BuildOptions {
     /// Cost of testing a triangle. Only its ratio to `traversal_cost` matters.
     float intersection_cost = 1.0f;
     /// References to triangles, at most, in multiples of the triangles, 1 to 64, where cells cut
-    /// triangles (k-d trees, octree). A part of the tree that has used up its share parts triangles without
-    /// cutting them. Lower it to save memory, 40 bytes a reference and while building about 250.
-    /// Doubling it lowers the SAH cost of generated scenes by 0 to 9%, mostly below 3%.
+    /// triangles (k-d trees, octree). A part of the tree that has used up its share parts triangles
+    /// without cutting them. Lower it to save memory, 40 bytes a reference and while building about
+    /// 250. Doubling it lowers the SAH cost of generated scenes by 0 to 9%, mostly below 3%.
     float max_reference_factor = 4.0f;
     /// Cells of an octree have sides of at least 2^-octree_levels of the scene's largest, 0 to 21.
     /// What is crowded in smaller ones is parted without cutting it. Lower it to save memory.
@@ -43,6 +44,12 @@ struct BuildOptions {
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
     /// the same for any number.
     int threads = 0;
+    /// Told how far the build is, roughly, as a fraction from 0 to 1 that never decreases: at the
+    /// start, then every 5 ms or hundredth, and at the end. False ends the build, within some
+    /// milliseconds: commit() throws Error{kCancelled} and the scene stays as it was. So do
+    /// exceptions, which commit() passes on. Called by any of the build's threads, by one at a
+    /// time; it must not use the scene. Without it a build is not slower.
+    std::function<bool(float fraction)> progress;
 };
 
 struct BuildStats {

@@ -61,15 +61,28 @@ static Hierarchy build_hierarchy(MeshView mesh, AlignedVector<Reference> referen
 }
 
 Tree build_tree(MeshView mesh, const BuildOptions& options) {
+    return with_progress(options.progress, [&](Progress& progress) {
+        return build_tree(mesh, options, progress, 1.0);
+    });
+}
+
+// Of a build's time, about; what making a tree of the hierarchy takes is the rest.
+static constexpr double kShareOfReferences = 0.05, kShareOfHierarchy = 0.75;
+
+Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress, double share) {
     const auto start = std::chrono::steady_clock::now();
     validate(mesh);
     validate(options);
-    const Parallel parallel(options.threads);
+    const Parallel parallel(options.threads, progress);
+    progress.start_phase(kShareOfReferences * share);
     References references;
     parallel.run([&] { references = collect_references(mesh, parallel); });
     const SkippedTriangles skipped = references.skipped;
-    Tree tree = make_tree(build_hierarchy(mesh, std::move(references.items), options, parallel),
-                          mesh, options, parallel);
+    progress.start_phase(kShareOfHierarchy * share);
+    const Hierarchy hierarchy =
+        build_hierarchy(mesh, std::move(references.items), options, parallel);
+    progress.start_phase((1.0 - kShareOfReferences - kShareOfHierarchy) * share);
+    Tree tree = make_tree(hierarchy, mesh, options, parallel);
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();
