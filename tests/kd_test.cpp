@@ -196,7 +196,7 @@ TEST_CASE("events handed down are those that the children would have sorted anew
     cell.spare = 1000;
     for (int axis = 0; axis < 3; ++axis) {
         const KdPlane plane{0.0, cell.bounds.center()[axis], axis, 0};
-        KdChildren children = cut_cell(mesh.view(), cell, plane);
+        KdChildren children = cut_cell(mesh.view(), cell, plane, parallel);
         CHECK(children.whole[0] < children.cell[0].references.size());
         split_events(cell.events, children, parallel);
         for (const KdCell& child : children.cell) {

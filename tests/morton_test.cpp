@@ -224,8 +224,9 @@ TEST_CASE("a builder whose codes would lead too deep stays within kMaxDepth") {
     options.max_leaf_size = 1;
     for (const int bits : {30, 63}) {
         options.morton_bits = bits;
-        const Hierarchy hierarchy = build_bvh_morton(references, options, Parallel(2));
-        const Tree tree = make_tree(hierarchy, options);
+        const Parallel parallel(2);
+        const Hierarchy hierarchy = build_bvh_morton(references, options, parallel);
+        const Tree tree = make_tree(hierarchy, options, parallel);
         CHECK(tree.stats.leaf_count == references.size());
         CHECK(tree.stats.depth > 40);
         CHECK(tree.stats.depth <= kMaxDepth);

@@ -2,6 +2,7 @@
 #include "commands.h"
 #include "npy.h"
 #include "options.h"
+#include "progress.h"
 #include "ray_kinds.h"
 
 #include <packet/gltf.h>
@@ -26,7 +27,7 @@ void run(const RaysOptions& options) {
     OutputFile file(options.output);  // first, so that a bad name is told before the work is done
     Scene scene = load_gltf(options.scene).scene;
     const Camera camera(options.camera, scene.bounds());
-    if (needs_commit(options.kind)) scene.commit(options.common.build);
+    if (needs_commit(options.kind)) commit_visibly(scene, options.common.build);
     const std::vector<Ray> rays =
         make_rays(options.kind, scene, camera, options.seed, options.common.trace);
     write_rays(std::move(file), rays);

@@ -1,6 +1,7 @@
 // packet render: an image of a scene.
 #include "commands.h"
 #include "options.h"
+#include "progress.h"
 #include "render.h"
 
 #include <packet/gltf.h>
@@ -28,7 +29,7 @@ void run(const RenderOptions& options) {
     OutputFile file(options.output);  // first, so that a bad name is told before the work is done
     Scene scene = load_gltf(options.scene).scene;
     const Camera camera(options.camera, scene.bounds());
-    scene.commit(options.common.build);
+    commit_visibly(scene, options.common.build);
 
     const auto start = std::chrono::steady_clock::now();
     const Image image =

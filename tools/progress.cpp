@@ -36,4 +36,19 @@ void Progress::advance(std::size_t steps) {
                100.0 * fraction);
 }
 
+void commit_visibly(Scene& scene, BuildOptions options) {
+    constexpr std::size_t kSteps = 1000;
+    Progress progress("build", kSteps);
+    std::size_t shown = 0;
+    if (progress.is_visible()) {
+        options.progress = [&](float fraction) {
+            const auto step = static_cast<std::size_t>(fraction * float{kSteps});
+            progress.advance(step - shown);
+            shown = step;
+            return true;
+        };
+    }
+    scene.commit(options);
+}
+
 }  // namespace packet::tools

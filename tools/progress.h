@@ -1,6 +1,8 @@
 // A progress bar on the terminal.
 #pragma once
 
+#include <packet/scene.h>
+
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -20,6 +22,7 @@ public:
     Progress& operator=(const Progress&) = delete;
 
     void advance(std::size_t steps);
+    [[nodiscard]] bool is_visible() const noexcept { return visible_; }
 
 private:
     std::string job_;
@@ -29,5 +32,8 @@ private:
     std::mutex drawing_;
     std::chrono::steady_clock::time_point last_drawn_{};
 };
+
+/// Commits the scene and shows how far that is.
+void commit_visibly(Scene& scene, BuildOptions options);
 
 }  // namespace packet::tools

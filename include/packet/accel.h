@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string_view>
 
@@ -49,6 +50,12 @@ struct BuildOptions {
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
     /// the same for any number.
     int threads = 0;
+    /// Told how far the build is, roughly, as a fraction from 0 to 1 that never decreases: at the
+    /// start, then every 5 ms or hundredth, and at the end. False ends the build, within some
+    /// milliseconds: commit() throws Error{kCancelled} and the scene stays as it was. So do
+    /// exceptions, which commit() passes on. Called by any of the build's threads, by one at a
+    /// time; it must not use the scene. Without it a build is not slower.
+    std::function<bool(float fraction)> progress;
 };
 
 struct BuildStats {

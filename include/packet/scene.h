@@ -37,8 +37,8 @@ public:
     std::uint32_t add_instance(std::uint32_t mesh_id,
                                const glm::mat4x3& world_from_object = glm::mat4x3(1.0f));
 
-    /// Builds what tracing needs. On an Error the scene stays as it was, an earlier commit
-    /// included.
+    /// Builds what tracing needs. On an Error, or what options.progress throws, the scene stays as
+    /// it was, an earlier commit included, and nothing is left of the build.
     void commit(const BuildOptions& options = {});
 
     [[nodiscard]] std::span<const TriangleMesh> meshes() const noexcept { return meshes_; }

@@ -41,11 +41,10 @@ AccelKind parse_accel(std::string_view name) {
     return find_by_name(kAccelNames, name, "structure").kind;
 }
 
+/// `tree(hierarchy)` makes a tree of what most builders hand on.
+template <class MakeTree>
 static Tree build(MeshView mesh, AlignedVector<Reference> references, const BuildOptions& options,
-                  const Parallel& parallel) {
-    const auto tree = [&](const Hierarchy& hierarchy) {
-        return make_tree(hierarchy, mesh, options, parallel);
-    };
+                  const Parallel& parallel, const MakeTree& tree) {
     const auto kd_tree = [&](KdRule rule) {
         return tree(build_kd_tree(rule, mesh, std::move(references), options, parallel));
     };
@@ -67,14 +66,29 @@ static Tree build(MeshView mesh, AlignedVector<Reference> references, const Buil
 }
 
 Tree build_tree(MeshView mesh, const BuildOptions& options) {
+    return with_progress(options.progress, [&](Progress& progress) {
+        return build_tree(mesh, options, progress, 1.0);
+    });
+}
+
+// Of a build's time, about; what making a tree of the hierarchy takes is the rest.
+static constexpr double kShareOfReferences = 0.05, kShareOfHierarchy = 0.75;
+
+Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress, double share) {
     const auto start = std::chrono::steady_clock::now();
     validate(mesh);
     validate(options);
-    const Parallel parallel(options.threads);
+    const Parallel parallel(options.threads, progress);
+    progress.start_phase(kShareOfReferences * share);
     References references;
     parallel.run([&] { references = collect_references(mesh, parallel); });
     const SkippedTriangles skipped = references.skipped;
-    Tree tree = build(mesh, std::move(references.items), options, parallel);
+    progress.start_phase(kShareOfHierarchy * share);
+    const auto finish = [&](const Hierarchy& hierarchy) {
+        progress.start_phase((1.0 - kShareOfReferences - kShareOfHierarchy) * share);
+        return make_tree(hierarchy, mesh, options, parallel);
+    };
+    Tree tree = build(mesh, std::move(references.items), options, parallel, finish);
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();

@@ -20,6 +20,7 @@ struct Cell {
     AlignedVector<Reference> references;  ///< boxes of the parts of triangles in this cell
     Bounds3f bounds;                      ///< theirs: cells end where their contents do
     std::size_t spare = 0;                ///< how many references cuts in here may add
+    double work = 1.0;                    ///< how much of the build it is
     int depth = 0;
 
     void add(const Reference& r) {
@@ -52,9 +53,10 @@ template <class Child>
     return count <= cell.references.size() + cell.spare;
 }
 
-/// What the cut has not used up is shared in proportion to the parts' references.
+/// Work, and the references that the cut has not used up, are shared in proportion to the parts'
+/// references.
 template <class Child>
-void share_spare(const Cell& cell, std::span<Child> children) {
+void share_out(const Cell& cell, std::span<Child> children) {
     PACKET_ASSERT(is_within_spare(cell, std::span<const Child>(children)));
     std::size_t count = 0;
     for (const Child& child : children) count += child.references.size();
@@ -68,6 +70,7 @@ void share_spare(const Cell& cell, std::span<Child> children) {
                 ? rest
                 : std::min(rest, static_cast<std::size_t>(share * static_cast<double>(left)));
         rest -= child.spare;
+        child.work = share * cell.work;
     }
 }
 

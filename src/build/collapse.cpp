@@ -21,6 +21,8 @@ namespace {
 // Expected cost of a wide node, and of a block of triangles: about as many instructions.
 constexpr float kNodeCost = 1.0f;
 constexpr float kBlockCost = 1.0f;
+// Nodes: some hundred microseconds of work.
+constexpr std::size_t kCheckInterval = 4096;
 
 /// The children of a wide node, in order.
 struct Children {
@@ -31,10 +33,13 @@ struct Children {
 /// The cuts of least cost.
 class BestCuts {
 public:
-    BestCuts(std::span<const Node> nodes, std::uint32_t block_size)
+    BestCuts(std::span<const Node> nodes, std::uint32_t block_size, const Parallel& parallel)
         : nodes_(nodes), block_size_(block_size), costs_(nodes.size()) {
         // Children come after their parent in depth-first order: backwards is bottom-up.
-        for (std::size_t i = nodes.size(); i-- > 0;) weigh(static_cast<std::uint32_t>(i));
+        for (std::size_t i = nodes.size(); i-- > 0;) {
+            if (i % kCheckInterval == 0) parallel.check();
+            weigh(static_cast<std::uint32_t>(i));
+        }
     }
 
     /// A subtree that becomes one child: a leaf if it has no children, or is cheaper so.
@@ -122,7 +127,7 @@ private:
 
     std::span<const Node> nodes_;
     std::uint32_t block_size_;
-    std::vector<Cost> costs_;
+    ScratchVector<Cost> costs_;
 };
 
 /// The cuts that a builder made.
@@ -159,8 +164,8 @@ private:
 template <class Cuts>
 class Writer {
 public:
-    Writer(std::span<Node> nodes, std::uint32_t block_size, Cuts cuts)
-        : nodes_(nodes), block_size_(block_size), cuts_(std::move(cuts)) {}
+    Writer(std::span<Node> nodes, std::uint32_t block_size, Cuts cuts, const Parallel& parallel)
+        : nodes_(nodes), block_size_(block_size), cuts_(std::move(cuts)), parallel_(parallel) {}
 
     Collapsed write() {
         if (!nodes_.empty()) emit(0);
@@ -177,6 +182,7 @@ private:
             children = cuts_.children(id);
         }
         const auto index = static_cast<std::uint32_t>(out_.nodes.size());
+        if (index % kCheckInterval == 0) parallel_.check();
         out_.nodes.push_back(empty_node());
         for (int i = 0; i < children.count; ++i) {
             const std::uint32_t child = children.id[i];
@@ -229,16 +235,19 @@ private:
     std::span<Node> nodes_;
     std::uint32_t block_size_;
     Cuts cuts_;
+    const Parallel& parallel_;
     Collapsed out_;
 };
 
 }  // namespace
 
 Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size,
-                   const std::vector<bool>& is_wide_child) {
-    if (is_wide_child.empty())
-        return Writer(nodes, block_size, BestCuts(nodes, block_size)).write();
-    return Writer(nodes, block_size, GivenCuts(nodes, is_wide_child)).write();
+                   const std::vector<bool>& is_wide_child, const Parallel& parallel) {
+    const auto write = [&](auto cuts) {
+        return Writer(nodes, block_size, std::move(cuts), parallel).write();
+    };
+    return is_wide_child.empty() ? write(BestCuts(nodes, block_size, parallel))
+                                 : write(GivenCuts(nodes, is_wide_child));
 }
 
 }  // namespace packet

@@ -20,8 +20,9 @@ struct Collapsed {
 /// expected cost of a random ray is least, or as `is_wide_child` says by node, if it is not empty;
 /// then places the items of each wide leaf so that it straddles as few blocks as it can. On entry
 /// the leaves of `nodes` link to references, on return to items. The order of items is that of the
-/// leaves. O(nodes).
+/// leaves. O(nodes), on
+/// one thread; `parallel` is asked whether to go on.
 [[nodiscard]] Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size,
-                                 const std::vector<bool>& is_wide_child = {});
+                                 const std::vector<bool>& is_wide_child, const Parallel& parallel);
 
 }  // namespace packet

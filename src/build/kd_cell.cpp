@@ -25,12 +25,17 @@ KdCost::KdCost(const KdCell& cell, const BuildOptions& options) noexcept {
     leaf_ = intersection_ * whole * static_cast<double>(cell.references.size());
 }
 
+// References: about a millisecond of work.
+static constexpr std::size_t kCheckInterval = 65536;
+
 /// `side_of(i)` tells where reference i goes.
 template <class SideOf>
-static void deal_whole(const KdCell& cell, KdChildren& out, SideOf side_of) {
+static void deal_whole(const KdCell& cell, const Parallel& parallel, KdChildren& out,
+                       SideOf side_of) {
     const std::size_t count = cell.references.size();
     out.places.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
+        if (i % kCheckInterval == 0) parallel.check();
         const int side = side_of(i);
         if (side == kBothSides) {
             out.places[i] = kCut;
@@ -45,13 +50,15 @@ static void deal_whole(const KdCell& cell, KdChildren& out, SideOf side_of) {
 }
 
 static void inherit(const KdCell& cell, KdChildren& out) {
-    share_spare<KdCell>(cell, out.cell);
+    share_out<KdCell>(cell, out.cell);
     for (KdCell& child : out.cell) child.depth = cell.depth + 1;
 }
 
-KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane) {
+KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane,
+                    const Parallel& parallel) {
     KdChildren out;
-    deal_whole(cell, out, [&](std::size_t i) { return plane.side_of(cell.references[i]); });
+    deal_whole(cell, parallel, out,
+               [&](std::size_t i) { return plane.side_of(cell.references[i]); });
     for (std::size_t i = 0; i < cell.references.size(); ++i) {
         if (out.places[i] != kCut) continue;
         const CutReference cut =
@@ -64,7 +71,7 @@ KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane) {
     return out;
 }
 
-KdChildren halve_cell(const KdCell& cell) {
+KdChildren halve_cell(const KdCell& cell, const Parallel& parallel) {
     const glm::vec3 extent = cell.bounds.extent();
     const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
                      : extent.y >= extent.z                       ? 1
@@ -83,7 +90,7 @@ KdChildren halve_cell(const KdCell& cell) {
     std::vector<std::uint8_t> side(order.size(), 0);
     for (std::size_t i = half; i < order.size(); ++i) side[order[i]] = 1;
     KdChildren out;
-    deal_whole(cell, out, [&](std::size_t i) { return static_cast<int>(side[i]); });
+    deal_whole(cell, parallel, out, [&](std::size_t i) { return static_cast<int>(side[i]); });
     inherit(cell, out);
     return out;
 }

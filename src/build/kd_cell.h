@@ -14,7 +14,8 @@ namespace packet {
 
 /// Where boxes begin and end along each axis, in the order in which a plane meets them; kd_events.h
 /// says how they are stored.
-using EventLists = std::array<std::vector<std::uint64_t>, 3>;
+using EventList = ScratchVector<std::uint64_t>;
+using EventLists = std::array<EventList, 3>;
 
 struct KdCell : Cell {
     EventLists events;  ///< kd-sah only
@@ -89,10 +90,12 @@ struct KdChildren {
 
 /// Cuts references along with space. No point of a triangle is lost; a child is empty if what the
 /// plane seemed to cut off is not there. The children share the spare references by their sizes.
-[[nodiscard]] KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane);
+/// On one thread; `parallel` is asked whether to go on.
+[[nodiscard]] KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane,
+                                  const Parallel& parallel);
 
 /// Deals the references out to two children that may overlap, half to each, by their centroids
 /// along the widest axis: for what no plane parts, like triangles that share a vertex.
-[[nodiscard]] KdChildren halve_cell(const KdCell& cell);
+[[nodiscard]] KdChildren halve_cell(const KdCell& cell, const Parallel& parallel);
 
 }  // namespace packet

@@ -1,5 +1,7 @@
 #include "build/kd_events.h"
 
+#include "build/radix_sort.h"
+
 #include <algorithm>
 #include <bit>
 
@@ -9,6 +11,8 @@ namespace {
 
 // Below this a task costs more than the work it moves to another core.
 constexpr std::size_t kTaskSize = 4096;
+// References: about a millisecond of work.
+constexpr std::size_t kCheckInterval = 65536;
 
 // An event is a number that sorts by position, then kind, then reference: 32, 2 and 30 bits. At one
 // position boxes end before others begin, so that boxes that merely touch do not overlap.
@@ -36,12 +40,25 @@ Event with_reference(Event event, std::size_t reference) {
     return (event & ~Event{kMaxEventReferences - 1}) | Event{reference};
 }
 
+/// Sorts events whose references ascend.
+void sort_events(EventList& events, const Parallel& parallel) {
+    // Up to here comparing is faster than five passes over digits.
+    constexpr std::size_t kMostCompared = 20000;
+    if (events.size() <= kMostCompared) return std::sort(events.begin(), events.end());
+    // A stable sort keeps references in order: it need not look at their bits.
+    EventList scratch(events.size());
+    const std::span<Event> sorted =
+        radix_sort<Event>(events, scratch, 34, parallel, [](Event event) { return event >> 30; });
+    if (sorted.data() == scratch.data()) events = std::move(scratch);
+}
+
 /// The sorted events of references `first` and after.
-std::vector<Event> sorted_events(const AlignedVector<Reference>& references, std::size_t first,
-                                 int axis) {
-    std::vector<Event> events;
+EventList sorted_events(const AlignedVector<Reference>& references, std::size_t first, int axis,
+                        const Parallel& parallel) {
+    EventList events;
     events.reserve(2 * (references.size() - first));
     for (std::size_t i = first; i < references.size(); ++i) {
+        if (i % kCheckInterval == 0) parallel.check();
         const Reference& r = references[i];
         if (r.lower[axis] == r.upper[axis]) {
             events.push_back(make_event(r.lower[axis], kFlat, i));
@@ -50,7 +67,7 @@ std::vector<Event> sorted_events(const AlignedVector<Reference>& references, std
             events.push_back(make_event(r.upper[axis], kEnd, i));
         }
     }
-    std::sort(events.begin(), events.end());
+    sort_events(events, parallel);
     return events;
 }
 
@@ -68,7 +85,7 @@ struct Group {
     std::size_t count[3] = {0, 0, 0};
     std::size_t next;  ///< the first event behind
 
-    Group(const std::vector<Event>& events, std::size_t first)
+    Group(const EventList& events, std::size_t first)
         : position(position_of(events[first])), next(first) {
         const Event end = (events[first] >> 32) + 1;
         for (; next < events.size() && events[next] >> 32 < end; ++next) {
@@ -79,7 +96,7 @@ struct Group {
 
 /// Moves a plane along the axis past all events and keeps the cheapest place.
 void sweep(const KdCell& cell, int axis, const KdCost& cost, KdPlane& best) {
-    const std::vector<Event>& events = cell.events[static_cast<std::size_t>(axis)];
+    const EventList& events = cell.events[static_cast<std::size_t>(axis)];
     const auto consider = [&](float end, float begin, const KdCounts& counts, int flat_side) {
         if (!counts.allow_cut(cell)) return;
         const double c = cost.cut(axis, end, begin, counts);
@@ -105,11 +122,12 @@ void sweep(const KdCell& cell, int axis, const KdCost& cost, KdPlane& best) {
 
 /// The child's events: those of its whole references from the parent's list, which stays in order
 /// as the references did, merged with those of the parts.
-std::vector<Event> child_events(const std::vector<Event>& parent, const KdChildren& children,
-                                std::size_t side, int axis) {
+EventList child_events(const EventList& parent, const KdChildren& children, std::size_t side,
+                       int axis, const Parallel& parallel) {
+    parallel.check();
     const AlignedVector<Reference>& references = children.cell[side].references;
-    const std::vector<Event> parts = sorted_events(references, children.whole[side], axis);
-    std::vector<Event> out;
+    const EventList parts = sorted_events(references, children.whole[side], axis, parallel);
+    EventList out;
     out.reserve(2 * references.size());
     auto part = parts.begin();
     for (const Event event : parent) {
@@ -127,8 +145,9 @@ std::vector<Event> child_events(const std::vector<Event>& parent, const KdChildr
 
 EventLists make_events(const AlignedVector<Reference>& references, const Parallel& parallel) {
     EventLists lists;
-    for_axes(references.size(), parallel,
-             [&](int a) { lists[static_cast<std::size_t>(a)] = sorted_events(references, 0, a); });
+    for_axes(references.size(), parallel, [&](int a) {
+        lists[static_cast<std::size_t>(a)] = sorted_events(references, 0, a, parallel);
+    });
     return lists;
 }
 
@@ -149,7 +168,8 @@ void split_events(const EventLists& parent, KdChildren& children, const Parallel
     for_axes(children.places.size(), parallel, [&](int a) {
         const auto axis = static_cast<std::size_t>(a);
         for (std::size_t side = 0; side < 2; ++side) {
-            children.cell[side].events[axis] = child_events(parent[axis], children, side, a);
+            children.cell[side].events[axis] =
+                child_events(parent[axis], children, side, a, parallel);
         }
     });
 }

@@ -31,8 +31,7 @@ public:
         : rule_(rule), mesh_(mesh), options_(options), parallel_(parallel) {}
 
     Hierarchy build(AlignedVector<Reference> references) {
-        Hierarchy out;
-        if (references.empty()) return out;
+        if (references.empty()) return {};
         const auto n = static_cast<double>(references.size());
         // Wald and Havran: deeper cuts do not pay.
         max_cut_depth_ = std::min(kMaxDepth, static_cast<int>(8.0 + 1.3 * std::log2(n)));
@@ -43,8 +42,7 @@ public:
             if (rule_ == KdRule::kSah) root.events = make_events(root.references, parallel_);
             build_node(std::move(root), tree);
         });
-        append(tree, out);
-        return out;
+        return to_hierarchy(std::move(tree), parallel_);
     }
 
     [[nodiscard]] std::size_t max_references() const {
@@ -66,8 +64,8 @@ private:
             // Its parent was as large, so this is the root of its subtree.
             PACKET_ASSERT(slot == 0);
             Subtree &tree0 = out.hang(slot, 0), &tree1 = out.hang(slot, 1);
-            parallel_.both([&] { build_node(std::move(children->cell[0]), tree0); },
-                           [&] { build_node(std::move(children->cell[1]), tree1); });
+            parallel_.both([&] { build_task(std::move(children->cell[0]), tree0); },
+                           [&] { build_task(std::move(children->cell[1]), tree1); });
             return;
         }
         out.nodes[slot].first = static_cast<std::uint32_t>(out.nodes.size());
@@ -76,18 +74,26 @@ private:
         build_node(std::move(children->cell[1]), out);
     }
 
+    void build_task(KdCell cell, Subtree& out) {
+        const double work = cell.references.size() > kTaskSize ? 0.0 : cell.work;
+        build_node(std::move(cell), out);
+        parallel_.advance(work);
+    }
+
     /// The two cells to go on with, or none for a leaf. May shrink the cell on the way.
     std::optional<KdChildren> divide(KdCell& cell) const {
         for (;;) {
+            parallel_.check();
             const std::size_t count = cell.references.size();
             if (count == 1) return {};
             const KdPlane plane = cell.depth < max_cut_depth_ ? find_plane(cell) : KdPlane{};
             const bool is_small = count <= static_cast<std::size_t>(options_.max_leaf_size);
             if (!plane.is_cut() && is_small) return {};
-            KdChildren children = plane.is_cut() ? cut_cell(mesh_, cell, plane) : halve_cell(cell);
+            KdChildren children = plane.is_cut() ? cut_cell(mesh_, cell, plane, parallel_)
+                                                 : halve_cell(cell, parallel_);
             if (!fit_depth(children)) {
                 if (is_small) return {};
-                children = halve_cell(cell);
+                children = halve_cell(cell, parallel_);
             }
             if (rule_ == KdRule::kSah) split_events(cell.events, children, parallel_);
             auto& [cell0, cell1] = children.cell;

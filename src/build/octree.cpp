@@ -118,15 +118,13 @@ public:
         : cutter_(mesh), options_(options), parallel_(parallel) {}
 
     Hierarchy build(AlignedVector<Reference> references) const {
-        Hierarchy out;
-        if (references.empty()) return out;
+        if (references.empty()) return {};
         OctreeCell root;
         fill_root(root, std::move(references), options_, kMaxReferences);
         root.box = cube_around(root.bounds);
         Subtree tree;
         parallel_.run([&] { build_cell(std::move(root), tree); });
-        append(tree, out);
-        return out;
+        return to_hierarchy(std::move(tree), parallel_);
     }
 
 private:
@@ -138,7 +136,9 @@ private:
             out.fill_leaf(node, cell.references);
             return node;
         }
-        Parts parts = divide(std::move(cell));
+        Parts parts = divide(cell);
+        share_out<OctreeCell>(cell, parts);
+        cell = {};  // it would otherwise stay while all below is built
         if (count <= kTaskSize) {
             link(node, parts, out, [&](std::uint32_t parent, int side, OctreeCell& part) {
                 const std::uint32_t child = build_cell(std::move(part), out);
@@ -154,9 +154,15 @@ private:
             hanging.push_back(&part);
         });
         parallel_.for_pieces(hanging.size(), 1, [&](std::size_t i, std::size_t) {
-            build_cell(std::move(*hanging[i]), *out.hanging[i].tree);
+            build_task(std::move(*hanging[i]), *out.hanging[i].tree);
         });
         return node;
+    }
+
+    void build_task(OctreeCell cell, Subtree& out) const {
+        const double work = cell.references.size() > kTaskSize ? 0.0 : cell.work;
+        build_cell(std::move(cell), out);
+        parallel_.advance(work);
     }
 
     /// Cubes make better cells than boxes of the scene's shape: in terrain, which is flat, with 13%
@@ -200,8 +206,9 @@ private:
         return std::count_if(parts.begin(), parts.end(), holds);
     }
 
-    /// The parts to go on with. At least two of them hold something.
-    Parts divide(OctreeCell cell) const {
+    /// The parts to go on with. At least two of them hold something. May shrink the cell on the
+    /// way.
+    Parts divide(OctreeCell& cell) const {
         while (cell.level < options_.octree_levels) {
             const unsigned octants = octants_of(cell.bounds, cell.box.center());
             if (std::has_single_bit(octants)) {
@@ -215,7 +222,6 @@ private:
                 continue;
             }
             if (!pays(cell, parts)) break;
-            share_spare<OctreeCell>(cell, parts);
             return parts;
         }
         return deal(cell);

@@ -108,6 +108,7 @@ private:
         node.second = static_cast<std::uint32_t>(slot1);
         const auto build_child = [&](std::size_t child, ReferenceSpan items) {
             build_node(child, items, measure(items, parallel_), depth + 1);
+            if (refs.size() > kTaskSize && items.size() <= kTaskSize) advance(items.size());
         };
         const auto build0 = [&] { build_child(slot0, refs.first(first)); };
         const auto build1 = [&] { build_child(slot1, refs.subspan(first)); };
@@ -117,6 +118,11 @@ private:
             build0();
             build1();
         }
+    }
+
+    void advance(std::size_t references) const {
+        parallel_.advance(static_cast<double>(references) /
+                          static_cast<double>(references_.size()));
     }
 
     const Parallel& parallel_;

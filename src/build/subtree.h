@@ -34,8 +34,9 @@ struct Subtree {
     }
 };
 
-/// Moves a subtree and what hangs on it into the hierarchy. Yields the root's index there.
-inline std::uint32_t append(Subtree& from, Hierarchy& to) {
+/// Moves a subtree and what hangs on it to the hierarchy's end. Yields the root's index there.
+inline std::uint32_t append(Subtree& from, Hierarchy& to, const Parallel& parallel) {
+    parallel.check();
     const auto base = static_cast<std::uint32_t>(to.nodes.size());
     const auto first = static_cast<std::uint32_t>(to.references.size());
     for (BuildNode node : from.nodes) {
@@ -47,11 +48,28 @@ inline std::uint32_t append(Subtree& from, Hierarchy& to) {
     to.is_wide_child.insert(to.is_wide_child.end(), from.is_wide_child.begin(),
                             from.is_wide_child.end());
     for (const Subtree::Hanging& hanging : from.hanging) {
-        const std::uint32_t root = append(*hanging.tree, to);
+        const std::uint32_t root = append(*hanging.tree, to, parallel);
         to.nodes[base + hanging.parent].child(hanging.side) = root;
     }
     from = {};
     return base;
+}
+
+/// Adds up what a subtree and what hangs on it hold.
+inline void count(const Subtree& tree, std::size_t& nodes, std::size_t& references) {
+    nodes += tree.nodes.size();
+    references += tree.references.size();
+    for (const Subtree::Hanging& hanging : tree.hanging) count(*hanging.tree, nodes, references);
+}
+
+[[nodiscard]] inline Hierarchy to_hierarchy(Subtree tree, const Parallel& parallel) {
+    Hierarchy out;
+    std::size_t nodes = 0, references = 0;
+    count(tree, nodes, references);
+    out.nodes.reserve(nodes);
+    out.references.reserve(references);
+    append(tree, out, parallel);
+    return out;
 }
 
 }  // namespace packet

@@ -14,6 +14,9 @@ namespace packet {
 
 namespace {
 
+// Of the time that making a tree of a hierarchy takes, about.
+constexpr double kShareOfNodes = 0.3, kShareOfCollapse = 0.5;
+
 Node make_node(const BuildNode& source) {
     Node node = {};
     for (int a = 0; a < 3; ++a) {
@@ -38,9 +41,19 @@ void count_node(const BuildNode& node, int depth, double root_area, const BuildO
                                               : static_cast<double>(options.traversal_cost));
 }
 
+/// Of a large array what is not used is never touched, and so takes no memory, but copying it takes
+/// long.
+template <class T>
+void trim(AlignedVector<T>& nodes) {
+    constexpr std::size_t kLarge = std::size_t{4} << 20;
+    if (nodes.capacity() * sizeof(T) < kLarge) nodes.shrink_to_fit();
+}
+
 /// The binary nodes, depth first. Yields which of them are wide children, if the builder says so.
 /// Iterative: small stacks of threads are not ours to fill.
-std::vector<bool> linearize(const Hierarchy& hierarchy, const BuildOptions& options, Tree& tree) {
+std::vector<bool> linearize(const Hierarchy& hierarchy, const BuildOptions& options,
+                            const Parallel& parallel, Tree& tree) {
+    constexpr std::size_t kCheckInterval = 4096;
     struct Pending {
         std::uint32_t source, parent;
         int depth;
@@ -49,12 +62,14 @@ std::vector<bool> linearize(const Hierarchy& hierarchy, const BuildOptions& opti
     const double root_area =
         std::max(static_cast<double>(tree.bounds.half_area()), std::numeric_limits<double>::min());
     std::vector<bool> is_wide_child;
+    tree.nodes.reserve(hierarchy.nodes.size());
     std::vector<Pending> stack = {{0, kNoParent, 0}};
     while (!stack.empty()) {
         const Pending p = stack.back();
         stack.pop_back();
         const BuildNode& source = hierarchy.nodes[p.source];
         const auto index = static_cast<std::uint32_t>(tree.nodes.size());
+        if (index % kCheckInterval == 0) parallel.check();
         if (p.parent != kNoParent) tree.nodes[p.parent].link = index;
         tree.nodes.push_back(make_node(source));
         if (!hierarchy.is_wide_child.empty()) {
@@ -65,19 +80,21 @@ std::vector<bool> linearize(const Hierarchy& hierarchy, const BuildOptions& opti
         stack.push_back({source.second, index, p.depth + 1});
         stack.push_back({source.first, kNoParent, p.depth + 1});
     }
-    tree.nodes.shrink_to_fit();
+    trim(tree.nodes);
     return is_wide_child;
 }
 
 /// Both forms of the tree, and where the references become items.
 Collapsed make_nodes(const Hierarchy& hierarchy, const BuildOptions& options,
-                     std::uint32_t block_size, Tree& tree) {
+                     std::uint32_t block_size, const Parallel& parallel, Tree& tree) {
     if (hierarchy.references.empty()) return {};
     tree.bounds = hierarchy.nodes[0].bounds;
-    const std::vector<bool> is_wide_child = linearize(hierarchy, options, tree);
-    Collapsed collapsed = collapse(tree.nodes, block_size, is_wide_child);
+    const std::vector<bool> is_wide_child = linearize(hierarchy, options, parallel, tree);
+    parallel.advance(kShareOfNodes);
+    Collapsed collapsed = collapse(tree.nodes, block_size, is_wide_child, parallel);
+    parallel.advance(kShareOfCollapse);
     tree.wide_nodes = std::move(collapsed.nodes);
-    tree.wide_nodes.shrink_to_fit();
+    trim(tree.wide_nodes);
     return collapsed;
 }
 
@@ -117,7 +134,7 @@ Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& op
                const Parallel& parallel) {
     constexpr std::size_t kGrain = 512;
     Tree tree;
-    const Collapsed collapsed = make_nodes(hierarchy, options, kBlockSize, tree);
+    const Collapsed collapsed = make_nodes(hierarchy, options, kBlockSize, parallel, tree);
     const std::span<const std::uint32_t> items = collapsed.reference_of_item;
     tree.blocks.resize((items.size() + kBlockSize - 1) / kBlockSize);
     parallel.run([&] {
@@ -133,9 +150,10 @@ Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& op
     return tree;
 }
 
-Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options) {
+Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options, const Parallel& parallel) {
     Tree tree;
-    (void)make_nodes(hierarchy, options, 1, tree);  // items are the references in their order
+    (void)make_nodes(hierarchy, options, 1, parallel,
+                     tree);  // items are the references in their order
     tree.stats.bytes = byte_count(tree);
     return tree;
 }

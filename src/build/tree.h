@@ -28,12 +28,17 @@ struct Tree {
                              const Parallel& parallel);
 
 /// Lays out only nodes, in both forms; items of the leaves are the hierarchy's references.
-[[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options);
+[[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options,
+                             const Parallel& parallel);
 
 /// Builds the structure that `options.accel` names. Triangles that can never be hit are left out
 /// and counted. The mesh may be destroyed afterwards. Throws Error as validate() and for bad
-/// options.
+/// options. Reports progress as `options` say.
 [[nodiscard]] Tree build_tree(MeshView mesh, const BuildOptions& options);
+
+/// The same as part of a larger job, of which it is `share`.
+[[nodiscard]] Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress,
+                              double share);
 
 /// Throws Error{kBadValue} that names the option out of its documented range.
 void validate(const BuildOptions& options);

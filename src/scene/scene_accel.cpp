@@ -24,11 +24,13 @@ void add_stats(BuildStats& sum, const BuildStats& tree) {
     sum.skipped.zero_area += tree.skipped.zero_area;
 }
 
+/// `share_of_one`: how much of the work a triangle is.
 void build_trees(std::span<const TriangleMesh> meshes, const BuildOptions& options,
-                 SceneAccel& out) {
+                 Progress& progress, double share_of_one, SceneAccel& out) {
     std::size_t most_triangles = 0;
     for (const TriangleMesh& mesh : meshes) {
-        out.trees.push_back(build_tree(mesh.view(), options));
+        const double share = share_of_one * static_cast<double>(mesh.triangles.size());
+        out.trees.push_back(build_tree(mesh.view(), options, progress, share));
         add_stats(out.stats, out.trees.back().stats);
         if (mesh.triangles.size() < most_triangles) continue;
         most_triangles = mesh.triangles.size();
@@ -63,7 +65,8 @@ struct TransformError {
 };
 
 /// The tree over the instances that show anything. The meshes' trees are built.
-void build_top(std::span<const Instance> instances, const BuildOptions& options, SceneAccel& out) {
+void build_top(std::span<const Instance> instances, const BuildOptions& options,
+               const Parallel& parallel, SceneAccel& out) {
     AlignedVector<Reference> references;
     std::vector<InstanceView> views(instances.size());
     TransformError error;
@@ -84,9 +87,8 @@ void build_top(std::span<const Instance> instances, const BuildOptions& options,
     }
     BuildOptions top_options = options;
     top_options.max_leaf_size = 1;
-    const Hierarchy hierarchy =
-        build_bvh_sah(std::move(references), top_options, Parallel(options.threads));
-    out.top = make_tree(hierarchy, top_options);
+    const Hierarchy hierarchy = build_bvh_sah(std::move(references), top_options, parallel);
+    out.top = make_tree(hierarchy, top_options, parallel);
     for (const Reference& r : hierarchy.references) out.instances.push_back(views[r.id]);
     out.view.top = out.top.view();
     error.apply(out.view.top);
@@ -94,13 +96,18 @@ void build_top(std::span<const Instance> instances, const BuildOptions& options,
 
 }  // namespace
 
-std::shared_ptr<const SceneAccel> build_scene_accel(std::span<const TriangleMesh> meshes,
-                                                    std::span<const Instance> instances,
-                                                    const BuildOptions& options) {
+static std::shared_ptr<const SceneAccel> build_all(std::span<const TriangleMesh> meshes,
+                                                   std::span<const Instance> instances,
+                                                   const BuildOptions& options,
+                                                   Progress& progress) {
     const auto start = std::chrono::steady_clock::now();
     const auto out = std::make_shared<SceneAccel>();
-    build_trees(meshes, options, *out);
-    build_top(instances, options, *out);
+    std::size_t work = instances.size();
+    for (const TriangleMesh& mesh : meshes) work += mesh.triangles.size();
+    const double share_of_one = 1.0 / static_cast<double>(std::max<std::size_t>(work, 1));
+    build_trees(meshes, options, progress, share_of_one, *out);
+    progress.start_phase(share_of_one * static_cast<double>(instances.size()));
+    build_top(instances, options, Parallel(options.threads, progress), *out);
     out->stats.bytes += out->top.stats.bytes + out->instances.size() * sizeof(InstanceView) +
                         out->mesh_of_instance.size() * sizeof(std::uint32_t);
     SceneView& view = out->view;
@@ -112,6 +119,14 @@ std::shared_ptr<const SceneAccel> build_scene_accel(std::span<const TriangleMesh
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     out->stats.seconds = elapsed.count();
     return out;
+}
+
+std::shared_ptr<const SceneAccel> build_scene_accel(std::span<const TriangleMesh> meshes,
+                                                    std::span<const Instance> instances,
+                                                    const BuildOptions& options) {
+    return with_progress(options.progress, [&](Progress& progress) {
+        return build_all(meshes, instances, options, progress);
+    });
 }
 
 }  // namespace packet

@@ -1,7 +1,11 @@
 // Spreads loops and pairs of tasks over threads. With one thread everything runs on the caller's,
 // and TBB is not touched; with more, in an arena of that many, so that no global setting is
-// changed.
+// changed. What a task throws ends the loop that it belongs to. Loops within other tasks run on:
+// ended from outside they would return as if they had done all their work. Tasks that may be told
+// to end find out by check().
 #pragma once
+
+#include "schedule/progress.h"
 
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_invoke.h>
@@ -19,6 +23,10 @@ namespace packet {
 class Parallel {
 public:
     explicit Parallel(int requested) : threads_(thread_count(requested)) {}
+    /// For a job whose progress is told, if it is wanted.
+    Parallel(int requested, Progress& progress)
+        : threads_(thread_count(requested)),
+          progress_(progress.is_wanted() ? &progress : nullptr) {}
     [[nodiscard]] int threads() const noexcept { return threads_; }
 
     /// Runs fn() where the other members spread their work over this many threads.
@@ -30,16 +38,31 @@ public:
             tbb::task_arena(threads_).execute(fn);
         }
     }
-    /// fn(begin, end) for pieces of [0, count) of `grain` items each, the last one shorter. The
-    /// pieces do not depend on the number of threads.
+    /// Throws Stopped if the job is to end. For loops that take milliseconds, every few thousand
+    /// turns; costs nothing if nobody wants to know of progress.
+    void check() const {
+        if (progress_ != nullptr) progress_->check();
+    }
+    /// `part` of the job's phase is done; then as check().
+    void advance(double part) const {
+        if (progress_ == nullptr) return;
+        progress_->advance(part);
+        progress_->check();
+    }
+    /// fn(begin, end) for pieces of [0, count) of `grain` items each, the last one shorter, with a
+    /// check() before each. The pieces do not depend on the number of threads.
     template <class Fn>
     void for_pieces(std::size_t count, std::size_t grain, Fn&& fn) const {
         const std::size_t pieces = (count + grain - 1) / grain;
-        const auto piece = [&](std::size_t i) { fn(i * grain, std::min(count, (i + 1) * grain)); };
+        const auto piece = [&](std::size_t i) {
+            check();
+            fn(i * grain, std::min(count, (i + 1) * grain));
+        };
         if (threads_ == 1 || pieces <= 1) {
             for (std::size_t i = 0; i < pieces; ++i) piece(i);
         } else {
-            tbb::parallel_for(std::size_t{0}, pieces, piece);
+            tbb::task_group_context context(tbb::task_group_context::isolated);
+            tbb::parallel_for(std::size_t{0}, pieces, piece, context);
         }
     }
     template <class A, class B>
@@ -48,12 +71,14 @@ public:
             a();
             b();
         } else {
-            tbb::parallel_invoke(a, b);
+            tbb::task_group_context context(tbb::task_group_context::isolated);
+            tbb::parallel_invoke(a, b, context);
         }
     }
 
 private:
     int threads_;
+    Progress* progress_ = nullptr;
 };
 
 }  // namespace packet
