@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 using namespace packet;
 using namespace packet::test;
@@ -27,13 +28,27 @@ Bounds3f box_of(const Node& node) {
             {node.plane[1][0], node.plane[1][1], node.plane[1][2]}};
 }
 
-bool is_grid(AccelKind kind) { return kind == AccelKind::kGrid; }
+bool is_grid(AccelKind kind) { return kind == AccelKind::kGrid || kind == AccelKind::kGridOfTrees; }
+
+/// A tree's arrays, or those of one cell's.
+struct Arrays {
+    std::span<const Node> nodes;
+    std::span<const TriangleBlock> blocks;
+
+    void note(const Node& leaf, const Bounds3f& box, Walked& out) const {
+        for (std::uint32_t i = leaf.link; i < leaf.link + leaf.count; ++i) {
+            REQUIRE(i / kBlockSize < blocks.size());
+            const auto id = blocks[i / kBlockSize].prim_id[i % kBlockSize];
+            out.boxes.at(static_cast<std::size_t>(id)).push_back(box);
+        }
+    }
+};
 
 /// Visits the whole tree; checks that boxes contain their children, and notes the box of the leaf
 /// for each triangle in it.
-void walk(const Tree& tree, std::uint32_t id, int depth, Walked& out) {
+void walk(const Arrays& tree, std::uint32_t id, int depth, Walked& out) {
     REQUIRE(id < tree.nodes.size());
-    REQUIRE(out.nodes++ < tree.nodes.size());  // a cycle would pass this
+    ++out.nodes;  // links lead on, so there are no cycles
     const Node& node = tree.nodes[id];
     const Bounds3f box = box_of(node);
     out.depth = std::max(out.depth, depth);
@@ -45,11 +60,7 @@ void walk(const Tree& tree, std::uint32_t id, int depth, Walked& out) {
         }
         return;
     }
-    for (std::uint32_t i = node.link; i < node.link + node.count; ++i) {
-        const TriangleBlock& block = tree.blocks.at(i / kBlockSize);
-        const std::uint32_t lane = i % kBlockSize;
-        out.boxes.at(static_cast<std::size_t>(block.prim_id[lane])).push_back(box);
-    }
+    tree.note(node, box, out);
 }
 
 /// The box of a grid's cell.
@@ -65,24 +76,38 @@ Bounds3f box_of_cell(const Grid& grid, std::size_t brick, std::size_t bit) {
     return box;
 }
 
+/// The arrays of a cell's tree, which end where the next begin.
+Arrays arrays_of(const Tree& tree, std::size_t id) {
+    const auto& trees = tree.grid.trees;
+    const std::size_t nodes = id + 1 < trees.size() ? trees[id + 1].node : tree.nodes.size();
+    const std::size_t blocks = id + 1 < trees.size() ? trees[id + 1].block : tree.blocks.size();
+    const GridTree& begin = trees.at(id);
+    return {std::span(tree.nodes).subspan(begin.node, nodes - begin.node),
+            std::span(tree.blocks).subspan(begin.block, blocks - begin.block)};
+}
+
 /// Visits all cells; notes the box of the cell for each triangle in it.
 void walk_grid(const Tree& tree, Walked& out) {
     const Grid& grid = tree.grid;
-    std::size_t cells = 0;
+    std::size_t cells = 0, leaves = 0;
     for (std::size_t b = 0; b < grid.bricks.size(); ++b) {
         if (grid.bricks[b].occupied != 0) CHECK(grid.bricks[b].first_cell == cells);
         for (std::size_t bit = 0; bit < 64; ++bit) {
             if ((grid.bricks[b].occupied >> bit & 1) == 0) continue;
             const GridCell& cell = grid.cells.at(cells++);
-            REQUIRE(cell.count != 0);
-            for (std::uint32_t i = cell.first; i < cell.first + cell.count; ++i) {
-                const auto id = tree.blocks.at(i / kBlockSize).prim_id[i % kBlockSize];
-                out.boxes.at(static_cast<std::size_t>(id)).push_back(box_of_cell(grid, b, bit));
+            const Bounds3f box = box_of_cell(grid, b, bit);
+            if (cell.count != 0) {
+                Arrays{{}, tree.blocks}.note({{}, cell.first, cell.count}, box, out);
+                ++leaves;
+            } else {
+                walk(arrays_of(tree, cell.first), 0, 0, out);
+                CHECK(box.contains(box_of(tree.nodes[grid.trees[cell.first].node])));
             }
         }
     }
     CHECK(cells == grid.cells.size());
-    CHECK(cells == tree.stats.leaf_count);
+    for (const Node& node : tree.nodes) leaves += node.is_leaf();
+    CHECK(leaves == tree.stats.leaf_count);
 }
 
 /// Points of a triangle with weights in steps of 1/6, corners, edges and inside.
@@ -130,8 +155,11 @@ Walked check_tree(const TriangleMesh& mesh, const BuildOptions& options = {}) {
     const Tree tree = build_tree(mesh.view(), options);
     Walked out;
     out.boxes.resize(mesh.triangles.size());
-    if (!tree.nodes.empty()) walk(tree, 0, 0, out);
-    if (!tree.grid.empty()) walk_grid(tree, out);
+    if (!tree.grid.empty()) {
+        walk_grid(tree, out);
+    } else if (!tree.nodes.empty()) {
+        walk({tree.nodes, tree.blocks}, 0, 0, out);
+    }
     CHECK(out.nodes == tree.nodes.size());
     if (tree.grid.empty()) CHECK(out.nodes == tree.stats.node_count);
     CHECK(out.depth == tree.stats.depth);

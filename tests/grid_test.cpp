@@ -335,12 +335,14 @@ TEST_CASE("the cap on references holds, and coarsens the grid as far as it must"
 
 TEST_CASE("hostile meshes build at once, and into little memory") {
     const auto check = [](const TriangleMesh& mesh) {
-        BuildOptions options;
-        options.accel = AccelKind::kGrid;
-        options.grid_density = 64.0f;
-        const Tree tree = build_tree(mesh.view(), options);
-        CHECK(tree.stats.seconds < 5.0);
-        CHECK(tree.stats.bytes < 1000 * mesh.triangles.size() + 1'000'000);
+        for (const AccelKind kind : {AccelKind::kGrid, AccelKind::kGridOfTrees}) {
+            BuildOptions options;
+            options.accel = kind;
+            options.grid_density = 64.0f;
+            const Tree tree = build_tree(mesh.view(), options);
+            CHECK(tree.stats.seconds < 5.0);
+            CHECK(tree.stats.bytes < 1000 * mesh.triangles.size() + 1'000'000);
+        }
     };
     TriangleMesh same;
     same.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -378,6 +380,35 @@ TEST_CASE("options out of range are errors that name them") {
         CHECK_THROWS_WITH_AS((void)build_tree(mesh.view(), options),
                              "BuildOptions::grid_density must be 1/64 to 64", Error);
     }
+}
+
+TEST_CASE("a small dense mesh in a large sparse one is traced with less work than by a grid") {
+    TriangleMesh mesh = tools::make_city(20000, 1);  // hundreds of metres wide
+    const auto offset = static_cast<std::uint32_t>(mesh.positions.size());
+    const TriangleMesh teapot = tools::make_sphere(20000);
+    const glm::vec3 middle = make_scene(mesh).bounds().center();
+    for (const glm::vec3& p : teapot.positions) mesh.positions.push_back(middle + 0.3f * p);
+    for (const glm::uvec3& t : teapot.triangles) mesh.triangles.push_back(t + offset);
+    std::vector<Ray> rays;
+    tools::Random random(5);
+    for (int i = 0; i < 1000; ++i) {
+        const glm::vec3 target = middle + 0.3f * random.direction();
+        rays.push_back(aim(middle + 3.0f * random.direction(), target));
+    }
+    Scene scene = make_scene(mesh);
+    const auto triangles_met = [&](AccelKind kind) {
+        BuildOptions options;
+        options.accel = kind;
+        scene.commit(options);
+        TraceStats stats;
+        TraceOptions trace;
+        trace.stats = &stats;
+        std::vector<Hit> hits(rays.size());
+        trace_closest(scene, rays, hits, trace);
+        return stats.triangles_per_ray();
+    };
+    CHECK(10.0 * triangles_met(AccelKind::kGridOfTrees) < triangles_met(AccelKind::kGrid));
+    check_agreement(scene, rays, "teapot in a stadium");
 }
 
 TEST_SUITE_BEGIN("agreement");

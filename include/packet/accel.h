@@ -20,7 +20,8 @@ enum class AccelKind : std::uint8_t {
     kKdMedian,     ///< k-d tree, cells cut at the median of what they hold, axes in turn
     kKdSah,        ///< k-d tree, cells cut by the surface area heuristic
     kOctree,       ///< cubes cut into eight equal ones
-    kGrid          ///< uniform grid: equal cells, as many as the triangles are
+    kGrid,         ///< uniform grid: equal cells, in proportion to the triangles
+    kGridOfTrees   ///< coarse grid whose crowded cells hold hierarchies of their own
 };
 
 struct BuildOptions {
@@ -43,7 +44,7 @@ struct BuildOptions {
     /// Cells of a grid, in multiples of the triangles, 1/64 to 64. More cells hold fewer triangles
     /// each, cut more of them, and take more steps to cross. A grid gets fewer where it would else
     /// exceed `max_reference_factor`.
-    float grid_density = 4.0f;
+    float grid_density = 2.0f;
     /// Bits of Morton codes, for `kBvhMorton`: 30, 63, or 0 to choose by the number of triangles.
     /// 30 sort faster, 63 tell apart what is 2^-21 of the scene's extent from each other.
     int morton_bits = 0;

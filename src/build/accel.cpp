@@ -2,6 +2,7 @@
 #include "build/bvh_midpoint.h"
 #include "build/bvh_morton.h"
 #include "build/bvh_sah.h"
+#include "build/grid_of_trees.h"
 #include "build/kd_tree.h"
 #include "build/octree.h"
 #include "build/tree.h"
@@ -26,6 +27,7 @@ static constexpr std::array kAccelNames = {
     AccelName{AccelKind::kKdSah, "kd-sah"},
     AccelName{AccelKind::kOctree, "octree"},
     AccelName{AccelKind::kGrid, "grid"},
+    AccelName{AccelKind::kGridOfTrees, "grid-of-trees"},
 };
 
 std::span<const AccelName> accel_names() noexcept { return kAccelNames; }
@@ -60,6 +62,8 @@ static Tree build(MeshView mesh, AlignedVector<Reference> references, const Buil
         case AccelKind::kBvhMorton:
             return tree(build_bvh_morton(std::move(references), options, parallel));
         case AccelKind::kGrid: return build_uniform_grid(mesh, references, options, parallel);
+        case AccelKind::kGridOfTrees:
+            return build_grid_of_trees(mesh, references, options, parallel);
     }
     PACKET_ASSERT(false && "an AccelKind that is not in the enumeration");
     return {};

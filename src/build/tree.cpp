@@ -98,11 +98,6 @@ Collapsed make_nodes(const Hierarchy& hierarchy, const BuildOptions& options,
     return collapsed;
 }
 
-std::size_t byte_count(const Tree& tree) {
-    return tree.nodes.size() * sizeof(Node) + tree.wide_nodes.size() * sizeof(WideNode) +
-           tree.blocks.size() * sizeof(TriangleBlock);
-}
-
 /// Stores the triangles of up to kBlockSize items; nothing hits the other lanes.
 void fill_block(TriangleBlock& block, std::span<const std::uint32_t> items, MeshView mesh,
                 std::span<const Reference> references) {
@@ -130,6 +125,11 @@ TreeView Tree::view() const noexcept {
     return out;
 }
 
+std::size_t Tree::byte_count() const noexcept {
+    return nodes.size() * sizeof(Node) + wide_nodes.size() * sizeof(WideNode) +
+           blocks.size() * sizeof(TriangleBlock) + grid.byte_count();
+}
+
 Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
                const Parallel& parallel) {
     constexpr std::size_t kGrain = 512;
@@ -146,15 +146,15 @@ Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& op
             }
         });
     });
-    tree.stats.bytes = byte_count(tree);
+    tree.stats.bytes = tree.byte_count();
     return tree;
 }
 
 Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options, const Parallel& parallel) {
     Tree tree;
-    (void)make_nodes(hierarchy, options, 1, parallel,
-                     tree);  // items are the references in their order
-    tree.stats.bytes = byte_count(tree);
+    // items are the references in their order
+    (void)make_nodes(hierarchy, options, 1, parallel, tree);
+    tree.stats.bytes = tree.byte_count();
     return tree;
 }
 

@@ -20,6 +20,7 @@ struct Tree {
     BuildStats stats;
 
     [[nodiscard]] TreeView view() const noexcept;
+    [[nodiscard]] std::size_t byte_count() const noexcept;
 };
 
 /// Lays the hierarchy out depth first, its triangles as blocks. Leaves that fit into one block do

@@ -1,93 +1,10 @@
 #include "build/uniform_grid.h"
 
-#include "build/grid_references.h"
-#include "build/triangle_block.h"
+#include "build/grid_layout.h"
 
-#include <algorithm>
+#include <limits>
 
 namespace packet {
-
-namespace {
-
-// Lists of cells a task lays out: some 100 us of work.
-constexpr std::size_t kGrain = 1024;
-
-/// The planes of the space, and its bricks with the bits of the cells that have lists.
-Grid make_bricks(const CellLists& cells) {
-    Grid grid;
-    const GridSpace& space = cells.space;
-    for (int a = 0; a < 3; ++a) {
-        grid.planes[a] = space.planes(a);
-        grid.brick_count[a] = space.brick_side(a);
-        grid.bricks_per_unit[a] = space.bricks_per_unit(a);
-    }
-    grid.bricks.resize(space.brick_count());
-    for (std::size_t i = cells.lists.size(); i-- > 0;) {  // so that the first of a brick stays
-        const std::uint32_t cell = cells.lists[i].cell;
-        GridBrick& brick = grid.bricks[cell / 64];
-        brick.occupied |= std::uint64_t{1} << cell % 64;
-        brick.first_cell = static_cast<std::uint32_t>(i);
-    }
-    return grid;
-}
-
-/// Where the next list of `count` items starts if `used` items are placed.
-std::size_t place_list(std::size_t used, std::size_t count) {
-    const std::size_t in_block = used % kBlockSize;
-    return in_block != 0 && in_block + count > kBlockSize ? used + kBlockSize - in_block : used;
-}
-
-/// Lists that a task lays out, in blocks of their own.
-struct Piece {
-    std::size_t begin, end;       ///< of the lists
-    std::size_t first_block = 0;  ///< of the blocks
-    std::size_t block_count = 0;
-};
-
-std::vector<Piece> place_pieces(const CellLists& cells, const Parallel& parallel) {
-    std::vector<Piece> pieces((cells.lists.size() + kGrain - 1) / kGrain);
-    parallel.for_pieces(cells.lists.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-        std::size_t used = 0;
-        for (std::size_t i = begin; i < end; ++i) {
-            used = place_list(used, cells.lists[i].count) + cells.lists[i].count;
-        }
-        pieces[begin / kGrain] = {begin, end, 0, (used + kBlockSize - 1) / kBlockSize};
-    });
-    for (std::size_t i = 1; i < pieces.size(); ++i) {
-        pieces[i].first_block = pieces[i - 1].first_block + pieces[i - 1].block_count;
-    }
-    return pieces;
-}
-
-void lay_out(const CellLists& cells, const Piece& piece, MeshView mesh, Tree& out) {
-    const auto first = out.blocks.begin() + static_cast<std::ptrdiff_t>(piece.first_block);
-    std::fill_n(first, piece.block_count, make_empty_block());
-    std::size_t used = piece.first_block * kBlockSize;
-    for (std::size_t i = piece.begin; i < piece.end; ++i) {
-        const CellList& list = cells.lists[i];
-        used = place_list(used, list.count);
-        out.grid.cells[i] = {static_cast<std::uint32_t>(used), list.count};
-        for (std::uint32_t k = 0; k < list.count; ++k, ++used) {
-            put_triangle(out.blocks[used / kBlockSize], used % kBlockSize, mesh,
-                         cells.ids[list.first + k]);
-        }
-    }
-}
-
-/// A random ray that meets the box meets a cell with the probability of their areas' ratio. The
-/// cells are all about the same size.
-double expected_cost(const Tree& tree, const CellLists& cells, const BuildOptions& options) {
-    const glm::dvec3 box(tree.bounds.extent());
-    const GridSpace& space = cells.space;
-    const glm::dvec3 cell = box / glm::dvec3(space.side(0), space.side(1), space.side(2));
-    const auto area = [](const glm::dvec3& e) { return e.x * e.y + e.y * e.z + e.z * e.x; };
-    const double share = area(box) > 0.0 ? area(cell) / area(box) : 1.0;
-    return share *
-           (static_cast<double>(space.cell_count()) * static_cast<double>(options.traversal_cost) +
-            static_cast<double>(cells.ids.size()) * static_cast<double>(options.intersection_cost));
-}
-
-}  // namespace
 
 Tree build_uniform_grid(MeshView mesh, const AlignedVector<Reference>& references,
                         const BuildOptions& options, const Parallel& parallel) {
@@ -96,19 +13,14 @@ Tree build_uniform_grid(MeshView mesh, const AlignedVector<Reference>& reference
     parallel.run([&] {
         const CellLists cells = sort_into_cells(
             mesh, references, static_cast<double>(options.grid_density), options, parallel);
-        out.grid = make_bricks(cells);
-        out.bounds = cells.space.bounds();
-        const std::vector<Piece> pieces = place_pieces(cells, parallel);
-        out.grid.cells.resize(cells.lists.size());
-        out.blocks.resize(pieces.back().first_block + pieces.back().block_count);
-        parallel.for_pieces(pieces.size(), 1, [&](std::size_t i, std::size_t) {
-            lay_out(cells, pieces[i], mesh, out);
-        });
-        out.stats.node_count = cells.space.cell_count();
-        out.stats.leaf_count = cells.lists.size();
-        out.stats.sah_cost = expected_cost(out, cells, options);
+        out = make_grid(cells, std::numeric_limits<std::uint32_t>::max(), mesh, parallel);
+        const double cost =
+            static_cast<double>(cells.space.cell_count()) *
+                static_cast<double>(options.traversal_cost) +
+            static_cast<double>(cells.ids.size()) * static_cast<double>(options.intersection_cost);
+        out.stats.sah_cost = cell_share(cells.space) * cost;
     });
-    out.stats.bytes = out.grid.byte_count() + out.blocks.size() * sizeof(TriangleBlock);
+    out.stats.bytes = out.byte_count();
     return out;
 }
 

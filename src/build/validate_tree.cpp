@@ -70,7 +70,9 @@ public:
     void run() {
         require(tree_.wide_nodes.empty() == tree_.nodes.empty(), "wide node", 0,
                 "only one of the two forms has nodes");
-        if (!tree_.nodes.empty()) {
+        if (!tree_.grid.trees.empty()) {
+            check_trees_of_cells();
+        } else if (!tree_.nodes.empty()) {
             check_order();
             for (std::uint32_t i = 0; i < tree_.nodes.size(); ++i) check_node(i);
             check_wide_nodes();
@@ -159,13 +161,30 @@ private:
             for (std::uint64_t left = cells.occupied; left != 0; left &= left - 1, ++next) {
                 require(next < grid.cells.size(), "brick", brick, "its cells are not there");
                 const GridCell& cell = grid.cells[next];
-                require(cell.count != 0, "cell", next, "is empty");
+                if (cell.count == 0) {
+                    require(cell.first < grid.trees.size(), "cell", next, "its tree is not there");
+                    continue;
+                }
                 hold_items("cell", static_cast<std::uint32_t>(next),
                            box_of_cell(grid, brick, std::countr_zero(left)), cell.first,
                            cell.count);
             }
         }
         require(next == grid.cells.size(), "cell", next, "belongs to no brick");
+    }
+
+    /// The leaves of cells' trees, one tree after the other.
+    void check_trees_of_cells() {
+        const AlignedVector<GridTree>& trees = tree_.grid.trees;
+        for (std::size_t i = 0; i < trees.size(); ++i) {
+            const std::size_t end = i + 1 < trees.size() ? trees[i + 1].node : tree_.nodes.size();
+            for (std::uint32_t n = trees[i].node; n < end; ++n) {
+                const Node& node = tree_.nodes[n];
+                if (!node.is_leaf()) continue;
+                hold_items("node", n, box_of(node), trees[i].block * kBlockSize + node.link,
+                           node.count);
+            }
+        }
     }
 
     static Bounds3f box_of_cell(const Grid& grid, std::size_t brick, int bit) {
@@ -303,7 +322,8 @@ bool cuts_triangles(AccelKind kind) noexcept {
         case AccelKind::kKdMedian:
         case AccelKind::kKdSah:
         case AccelKind::kOctree:
-        case AccelKind::kGrid: return true;
+        case AccelKind::kGrid:
+        case AccelKind::kGridOfTrees: return true;
     }
     return false;
 }

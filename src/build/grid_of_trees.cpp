@@ -1,0 +1,144 @@
+#include "build/grid_of_trees.h"
+
+#include "build/bvh_sah.h"
+#include "build/clip.h"
+#include "build/grid_layout.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace packet {
+
+namespace {
+
+// The grid has this many of the cells that a uniform grid would have. Four times as many build more
+// slowly, for they cut more triangles, and trace more slowly, for trees find what is near faster.
+constexpr double kCellShare = 1.0 / 128.0;
+// Two blocks: testing both costs about as much as a node that tells which of them to test.
+constexpr std::uint32_t kLongestList = 16;
+// Where a single ray meets eight triangles at once, a node costs as much as eight of them. Trees
+// that know are half as large, and built in two thirds of the time.
+constexpr float kNodeCost = static_cast<float>(kBlockSize);
+// Trees of more references than this are built by all threads, one after the other.
+constexpr std::uint32_t kSharedTree = 65536;
+
+/// The box of the part of a triangle in a cell.
+Reference make_reference(MeshView mesh, std::uint32_t id, const Bounds3f& cell) {
+    const glm::uvec3 t = mesh.triangles[id];
+    const glm::vec3 corners[3] = {mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z]};
+    Bounds3f box;
+    for (const glm::vec3& p : corners) box.extend(p);
+    if (!cell.contains(box)) box = clip_triangle(corners, cell);
+    return {box.lower, id, box.upper};
+}
+
+class TreesBuilder {
+public:
+    TreesBuilder(const CellLists& cells, MeshView mesh, const BuildOptions& options,
+                 const Parallel& parallel)
+        : cells_(cells), mesh_(mesh), options_(options), parallel_(parallel) {
+        options_.traversal_cost *= kNodeCost;
+        for (std::size_t i = 0; i < cells.lists.size(); ++i) {
+            if (cells.lists[i].count > kLongestList) crowded_.push_back(i);
+        }
+    }
+
+    /// Adds the trees to a grid that has only lists.
+    void add_to(Tree& out) {
+        trees_.resize(crowded_.size());
+        for (std::size_t i = 0; i < trees_.size(); ++i) {
+            if (list(i).count > kSharedTree) trees_[i] = build(list(i), parallel_);
+        }
+        const Parallel alone(1);
+        parallel_.for_pieces(trees_.size(), 1, [&](std::size_t i, std::size_t) {
+            if (list(i).count <= kSharedTree) trees_[i] = build(list(i), alone);
+        });
+        place(out);
+        parallel_.for_pieces(trees_.size(), 1, [&](std::size_t i, std::size_t) {
+            const GridTree& begin = out.grid.trees[i];
+            copy(trees_[i].nodes, out.nodes, begin.node);
+            copy(trees_[i].wide_nodes, out.wide_nodes, begin.wide_node);
+            copy(trees_[i].blocks, out.blocks, begin.block);
+            trees_[i] = {};
+        });
+    }
+
+private:
+    [[nodiscard]] const CellList& list(std::size_t tree) const {
+        return cells_.lists[crowded_[tree]];
+    }
+
+    [[nodiscard]] Tree build(const CellList& in, const Parallel& parallel) const {
+        const Bounds3f cell = cells_.space.box_of(cells_.space.cell_of(in.cell));
+        AlignedVector<Reference> references(in.count);
+        for (std::size_t i = 0; i < in.count; ++i) {
+            references[i] = make_reference(mesh_, cells_.ids[in.first + i], cell);
+        }
+        return make_tree(build_bvh_sah(std::move(references), options_, parallel), mesh_, options_,
+                         parallel);
+    }
+
+    /// Makes room for the trees behind what there is, and adds up their statistics.
+    void place(Tree& out) const {
+        std::size_t nodes = 0, wide_nodes = 0, blocks = out.blocks.size();
+        const double box_area = std::max(static_cast<double>(out.bounds.half_area()), 1e-300);
+        for (std::size_t i = 0; i < trees_.size(); ++i) {
+            const Tree& tree = trees_[i];
+            out.grid.cells[crowded_[i]] = {static_cast<std::uint32_t>(i), 0};
+            out.grid.trees.push_back({static_cast<std::uint32_t>(nodes),
+                                      static_cast<std::uint32_t>(wide_nodes),
+                                      static_cast<std::uint32_t>(blocks)});
+            nodes += tree.nodes.size();
+            wide_nodes += tree.wide_nodes.size();
+            blocks += tree.blocks.size();
+            out.stats.depth = std::max(out.stats.depth, tree.stats.depth);
+            out.stats.leaf_count += tree.stats.leaf_count - 1;  // its cell is none
+            out.stats.sah_cost +=
+                tree.stats.sah_cost * static_cast<double>(tree.bounds.half_area()) / box_area;
+        }
+        out.stats.node_count += nodes;
+        out.nodes.resize(nodes);
+        out.wide_nodes.resize(wide_nodes);
+        out.blocks.resize(blocks);
+    }
+
+    template <class From, class To>
+    static void copy(const From& from, To& to, std::uint32_t begin) {
+        std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(begin));
+    }
+
+    const CellLists& cells_;
+    MeshView mesh_;
+    BuildOptions options_;  ///< of the trees
+    const Parallel& parallel_;
+    std::vector<std::size_t> crowded_;  ///< lists that become trees
+    std::vector<Tree> trees_;           ///< theirs
+};
+
+}  // namespace
+
+Tree build_grid_of_trees(MeshView mesh, const AlignedVector<Reference>& references,
+                         const BuildOptions& options, const Parallel& parallel) {
+    Tree out;
+    if (references.empty()) return out;
+    parallel.run([&] {
+        const CellLists cells = sort_into_cells(
+            mesh, references, kCellShare * static_cast<double>(options.grid_density), options,
+            parallel);
+        out = make_grid(cells, kLongestList, mesh, parallel);
+        std::size_t in_lists = 0;
+        for (const CellList& list : cells.lists) {
+            in_lists += list.count <= kLongestList ? list.count : 0;
+        }
+        const double cost =
+            static_cast<double>(cells.space.cell_count()) *
+                static_cast<double>(options.traversal_cost) +
+            static_cast<double>(in_lists) * static_cast<double>(options.intersection_cost);
+        out.stats.sah_cost = cell_share(cells.space) * cost;
+        TreesBuilder(cells, mesh, options, parallel).add_to(out);
+    });
+    out.stats.bytes = out.byte_count();
+    return out;
+}
+
+}  // namespace packet
