@@ -11,6 +11,8 @@ namespace {
 
 // Lists of cells a task lays out: some 100 us of work.
 constexpr std::size_t kGrain = 1024;
+// Of the time that a grid takes, about.
+constexpr double kShareOfLayout = 0.3;
 
 /// The planes of the space, and its bricks with the bits of the cells that have lists.
 Grid make_bricks(const CellLists& cells) {
@@ -90,6 +92,7 @@ Tree make_grid(const CellLists& cells, std::uint32_t longest, MeshView mesh,
     out.blocks.resize(pieces.back().first_block + pieces.back().block_count);
     parallel.for_pieces(pieces.size(), 1, [&](std::size_t i, std::size_t) {
         lay_out(cells, longest, pieces[i], mesh, out);
+        parallel.advance(kShareOfLayout / static_cast<double>(pieces.size()));
     });
     out.stats.node_count = cells.space.cell_count();
     out.stats.leaf_count = cells.lists.size();

@@ -21,6 +21,8 @@ namespace {
 
 // Some 300 us of work, and few enough pieces for a table of counts by piece and group.
 constexpr std::size_t kGrain = 8192;
+// Of the time that a grid takes, about; laying it out is the rest.
+constexpr double kShareOfOverlaps = 0.5, kShareOfSort = 0.2;
 // Groups of cells, at most: each has a place in memory that is written to, a page of its own.
 constexpr std::size_t kMostGroups = 512;
 // References are named by 31 bits.
@@ -150,6 +152,8 @@ Pieces find_references(MeshView mesh, const GridSpace& space,
             finder.add(references[i]);
         }
         total += out.size();
+        parallel.advance(kShareOfOverlaps * static_cast<double>(end - begin) /
+                         static_cast<double>(references.size()));
     });
     if (total > limit) pieces.clear();
     return pieces;
@@ -179,6 +183,7 @@ Grouped sort_by_group(Pieces pieces, const Groups& groups, const Parallel& paral
     parallel.for_pieces(pieces.size(), 1, [&](std::size_t p, std::size_t) {
         places[p].resize(groups.count);
         for (const CellReference& r : pieces[p]) ++places[p][groups.group_of(r.cell)];
+        parallel.advance(kShareOfSort / 3.0 / static_cast<double>(pieces.size()));
     });
     Grouped out;
     std::uint32_t place = 0;
@@ -192,6 +197,7 @@ Grouped sort_by_group(Pieces pieces, const Groups& groups, const Parallel& paral
             out.references[places[p][groups.group_of(r.cell)]++] = r;
         }
         pieces[p] = {};
+        parallel.advance(kShareOfSort / 3.0 / static_cast<double>(pieces.size()));
     });
     return out;
 }
@@ -246,6 +252,7 @@ CellLists sort_into_cells(MeshView mesh, const AlignedVector<Reference>& referen
         const std::size_t count = grouped.ends[g] - first;
         lists[g] = sort_group(std::span(grouped.references).subspan(first, count), first,
                               groups.cells(), std::span(out.ids).subspan(first, count));
+        parallel.advance(kShareOfSort / 3.0 / static_cast<double>(groups.count));
     });
     for (const auto& part : lists) out.lists.insert(out.lists.end(), part.begin(), part.end());
     return out;
