@@ -26,13 +26,11 @@ constexpr std::array kModeNames = {
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
 constexpr std::size_t kRaysPerTask = 512;
-// What auto tries where there are rays enough. Packets of 8 never won by much.
-constexpr KernelTable::Kernel kContenders[] = {KernelTable::kSingle, KernelTable::kPacket16,
-                                               KernelTable::kTile};
-// It does so this many times, each time on neighbouring tasks,
-constexpr std::size_t kTrials = 5;
+// Where there are rays enough auto tries packets of 16 beside what the rays' looks suggest. Packets
+// of 8 never won by much. It does so this many times, each time on neighbouring tasks,
+constexpr std::size_t kTrialPairs = 5;
 // if that is so little of the whole that the slower tries do not count.
-constexpr std::size_t kLeastTasksForTrial = 192;
+constexpr std::size_t kLeastTasksForTrial = 128;
 
 KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
@@ -102,7 +100,7 @@ public:
             options_.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
         const auto kernel = [&](KernelTable::Kernel which) { return kernels[which][counting]; };
         parallel_.run([&] {
-            const KernelTable::Kernel best = tries_ ? try_kernels(kernel, batch) : kernel_;
+            const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : kernel_;
             parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
                 if (!is_trial(task)) run_task(task, kernel(best), batch);
             });
@@ -110,30 +108,27 @@ public:
     }
 
 private:
-    /// Groups of neighbouring tasks, spread over all: each contender gets one of a group.
-    [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrials; }
+    /// Pairs of neighbouring tasks, spread over all: each contender gets one of a pair.
+    [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrialPairs; }
     [[nodiscard]] bool is_trial(std::size_t task) const {
-        return tries_ && task % trial_stride() < std::size(kContenders) &&
-               task / trial_stride() < kTrials;
+        return tries_ && task % trial_stride() < 2 && task / trial_stride() < kTrialPairs;
     }
 
-    /// Traces the trial tasks and returns what was fastest most often: a vote, since one task that
-    /// the system interrupts must not decide. Their hits are as good as any.
+    /// Traces the trial tasks and returns what was faster in most pairs: a vote, since one task
+    /// that the system interrupts must not decide. Their hits are as good as any.
     template <class KernelOf>
-    [[nodiscard]] KernelTable::Kernel try_kernels(const KernelOf& kernel,
+    [[nodiscard]] KernelTable::Kernel try_packets(const KernelOf& kernel,
                                                   const TraceBatch& batch) const {
         using Clock = std::chrono::steady_clock;
-        std::array<int, std::size(kContenders)> won{};
-        for (std::size_t trial = 0; trial < kTrials; ++trial) {
-            std::array<Clock::duration, std::size(kContenders)> time;
-            for (std::size_t i = 0; i < std::size(kContenders); ++i) {
-                const Clock::time_point start = Clock::now();
-                run_task(trial * trial_stride() + i, kernel(kContenders[i]), batch);
-                time[i] = Clock::now() - start;
-            }
-            ++won[static_cast<std::size_t>(std::ranges::min_element(time) - time.begin())];
+        std::size_t won_by_packets = 0;
+        for (std::size_t pair = 0; pair < kTrialPairs; ++pair) {
+            const Clock::time_point start = Clock::now();
+            run_task(pair * trial_stride(), kernel(kernel_), batch);
+            const Clock::time_point middle = Clock::now();
+            run_task(pair * trial_stride() + 1, kernel(KernelTable::kPacket16), batch);
+            won_by_packets += Clock::now() - middle < middle - start;
         }
-        return kContenders[std::ranges::max_element(won) - won.begin()];
+        return 2 * won_by_packets > kTrialPairs ? KernelTable::kPacket16 : kernel_;
     }
 
     void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
