@@ -5,6 +5,7 @@
 // to end find out by check().
 #pragma once
 
+#include "schedule/fork_join.h"
 #include "schedule/progress.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -62,7 +63,7 @@ public:
             for (std::size_t i = 0; i < pieces; ++i) piece(i);
         } else {
             tbb::task_group_context context(tbb::task_group_context::isolated);
-            tbb::parallel_for(std::size_t{0}, pieces, piece, context);
+            tbb::parallel_for(std::size_t{0}, pieces, ForkJoin(piece), context);
         }
     }
     template <class A, class B>
@@ -72,7 +73,8 @@ public:
             b();
         } else {
             tbb::task_group_context context(tbb::task_group_context::isolated);
-            tbb::parallel_invoke(a, b, context);
+            const ForkJoin first(a), second(b);
+            tbb::parallel_invoke(first, second, context);
         }
     }
 
