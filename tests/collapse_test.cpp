@@ -15,7 +15,8 @@ template <class Fn>
 void for_each_child(const Tree& tree, Fn fn) {
     for (const WideNode& node : tree.wide_nodes) {
         for (int i = 0; i < kWideSize; ++i) {
-            if (node.plane[0][0][i] <= node.plane[1][0][i]) fn(node.child[i].link, node.child[i].count);
+            if (node.plane[0][0][i] <= node.plane[1][0][i])
+                fn(node.child[i].link, node.child[i].count);
         }
     }
 }

@@ -46,7 +46,9 @@ struct Child {
         return t.wide_nodes[node].plane[side][axis][lane];
     }
     [[nodiscard]] std::uint32_t& link(Tree& t) const { return t.wide_nodes[node].child[lane].link; }
-    [[nodiscard]] std::uint32_t& count(Tree& t) const { return t.wide_nodes[node].child[lane].count; }
+    [[nodiscard]] std::uint32_t& count(Tree& t) const {
+        return t.wide_nodes[node].child[lane].count;
+    }
 };
 
 /// Places in a sound tree to spoil.

@@ -73,7 +73,8 @@ public:
             b();
         } else {
             tbb::task_group_context context(tbb::task_group_context::isolated);
-            const ForkJoin first(a), second(b);
+            const ForkJoin first(a);
+            const ForkJoin second(b);
             tbb::parallel_invoke(first, second, context);
         }
     }
