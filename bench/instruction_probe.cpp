@@ -14,15 +14,15 @@ struct Probe {
     [[gnu::noinline]] static std::uint32_t rays_meet_triangle(const ShearRays<N, Isa>& ray,
                                                               const TriangleBlock& block,
                                                               int lane) {
-        return may_hit<directions>(ray, SameTriangle{block, lane}).bits();
+        return shear<directions>(ray, SameTriangle{block, lane}).may_hit().bits();
     }
     [[gnu::noinline]] static void rays_hit_triangle(const PreparedRays<N, Isa>& ray,
                                                     const TriangleBlock& block, int lane,
                                                     const Float<N, Isa>& best_t,
-                                                    std::uint32_t candidates,
+                                                    std::uint32_t active,
                                                     TriangleHits<N, Isa>& out) {
-        out = decide_hits<directions>(ray, best_t, Mask<N, Isa>::from_bits(candidates),
-                                      SameTriangle{block, lane});
+        out = meet_triangle<directions>(ray, best_t, Mask<N, Isa>::from_bits(active),
+                                        SameTriangle{block, lane});
     }
 };
 
@@ -32,7 +32,7 @@ struct SingleProbe {
                                                            const TriangleBlock& block) {
         ShearRays<kBlockSize, Isa> shear;
         ray.broadcast(shear);
-        return may_hit<Directions::kShared>(shear, BlockTriangles{block}).bits();
+        return packet::shear<Directions::kShared>(shear, BlockTriangles{block}).may_hit().bits();
     }
 };
 

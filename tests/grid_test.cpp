@@ -127,7 +127,7 @@ struct MarchCase {
                               plane(2, first[2] + side));
         const Float<1, Lane> low[3] = {lower.x, lower.y, lower.z};
         const Float<1, Lane> high[3] = {upper.x, upper.y, upper.z};
-        const auto box = slabs(prepared, low, high);
+        const auto box = slabs(prepared.hit, low, high);
         return {std::max(box.enter.r[0], ray.tnear.r[0]), std::min(box.exit.r[0], tfar)};
     }
 

@@ -85,13 +85,13 @@ public:
             const M active = is_active(p);
             slope[0].extend(active, ray.shear.shear_x);
             slope[1].extend(active, ray.shear.shear_y);
-            const F z = ray.shear.org[2] * F(sign), speed = abs(F(1.0f) / ray.shear.scale_z);
+            const F z = ray.shear.org[2] * F(sign), speed = abs(F(1.0f) / ray.hit.scale_z);
             first = min(first, select(active, z, first));
-            tnear.extend(active, ray.tnear);
-            begin.extend(active, z + ray.tnear * speed);
+            tnear.extend(active, ray.hit.tnear);
+            begin.extend(active, z + ray.hit.tnear * speed);
             end.extend(active, z + best_[p].t * speed);
             for (int a = 0; a < 3; ++a) {
-                margin = max(margin, select(active, ray.org[0][a] - ray.org[1][a], margin));
+                margin = max(margin, select(active, ray.hit.org[0][a] - ray.hit.org[1][a], margin));
             }
         }
         // The difference of the grown origins is twice the growth, which bounds a hit's rounding.

@@ -17,8 +17,7 @@ struct Interval {
 
 /// Rays against triangles' boxes. For each axis the order of its planes follows from dir.
 template <int N, class Isa>
-PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray,
-                                     const Float<N, Isa> (&lower)[3],
+PACKET_INLINE Interval<N, Isa> slabs(const HitRays<N, Isa>& ray, const Float<N, Isa> (&lower)[3],
                                      const Float<N, Isa> (&upper)[3]) {
     Interval<N, Isa> out;
     for (int a = 0; a < 3; ++a) {
@@ -38,9 +37,8 @@ PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray, const Node
     Interval<N, Isa> out;
     for (int a = 0; a < 3; ++a) {
         const int near = directions == Directions::kShared ? ray.near_side[a] : 0;
-        const F t0 = multiply_subtract(F(node.plane[near][a]), ray.inv_dir[a], ray.shift[near][a]);
-        const F t1 =
-            multiply_subtract(F(node.plane[1 - near][a]), ray.inv_dir[a], ray.shift[1 - near][a]);
+        const F t0 = multiply_subtract(F(node.plane[near][a]), ray.inv_dir[a], ray.shift[0][a]);
+        const F t1 = multiply_subtract(F(node.plane[1 - near][a]), ray.inv_dir[a], ray.shift[1][a]);
         const F t_near = directions == Directions::kShared ? t0 : min(t0, t1);
         const F t_far = directions == Directions::kShared ? t1 : max(t0, t1);
         out.enter = a == 0 ? t_near : max(out.enter, t_near);
@@ -54,7 +52,7 @@ template <int N, class Isa>
 PACKET_INLINE Mask<N, Isa> meets(const PreparedRays<N, Isa>& ray, const Interval<N, Isa>& box,
                                  const Float<N, Isa>& best_t) {
     // if (max(enter, tnear) > min(exit, best_t)) the lane misses; equal must pass, for the tie rule
-    return max(box.enter, ray.tnear) <= min(box.exit, best_t);
+    return max(box.enter, ray.hit.tnear) <= min(box.exit, best_t);
 }
 
 }  // namespace packet

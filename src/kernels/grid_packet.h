@@ -64,7 +64,7 @@ struct GridPacket {
         order[2] = order[0] == 0 ? 2 : order[0] - 1;
         for (int i = 0; i < 3; ++i) {
             const int a = order[i];
-            const std::uint32_t negative = (ray.reciprocal[a] < F(0.0f)).bits();
+            const std::uint32_t negative = (ray.hit.reciprocal[a] < F(0.0f)).bits();
             const bool backward = (negative >> lead & 1) != 0;
             const int count = grid.brick_count[a];
             const std::int32_t step =
@@ -73,16 +73,16 @@ struct GridPacket {
             axis[i] = {backward ? grid.planes[a] + count * kBrickSide : grid.planes[a],
                        backward ? -kBrickSide : kBrickSide,
                        count,
-                       backward ? ray.org[1][a] : ray.org[0][a],
-                       backward ? ray.org[0][a] : ray.org[1][a],
-                       ray.reciprocal[a]};
+                       backward ? ray.hit.org[1][a] : ray.hit.org[0][a],
+                       backward ? ray.hit.org[0][a] : ray.hit.org[1][a],
+                       ray.hit.reciprocal[a]};
             first_brick += backward ? (count - 1) * step : 0;
             brick_step[i] = backward ? -step : step;
             flipped |= backward ? 3u << 2 * a : 0u;
             enter = i == 0 ? axis[0].enter(0) : max(enter, axis[i].enter(0));
             exit = i == 0 ? axis[0].exit(count - 1) : min(exit, axis[i].exit(count - 1));
         }
-        enter = max(enter, ray.tnear);
+        enter = max(enter, ray.hit.tnear);
     }
 };
 
@@ -124,7 +124,7 @@ PACKET_INLINE void walk_brick(const TreeView& tree, const GridPacket<N, Isa>& pa
         const auto exit =
             min(min(crossings.exit[0][x], crossings.exit[1][y]), crossings.exit[2][z]);
         // if (max(enter, tnear) > min(exit, best_t)) the lane misses; equal must pass
-        const Mask<N, Isa> active = max(enter, ray.tnear) <= min(exit, best.t);
+        const Mask<N, Isa> active = max(enter, ray.hit.tnear) <= min(exit, best.t);
         if (none(active)) continue;
         stats.visit(count(active), N);
         meet_cell<query>(tree, cell_of_bit(tree.grid, brick, at ^ packet.flipped), ray, active,

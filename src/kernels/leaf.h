@@ -41,20 +41,12 @@ struct PacketLeaf {
                             Mask<N, Isa> active) const {
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
-            const Mask<N, Isa> candidates =
-                active & may_hit<directions>(ray.shear, SameTriangle{block, lane});
-            if (any(candidates)) decide(block, lane, candidates);
+            const TriangleHits<N, Isa> hits =
+                meet_triangle<directions>(ray, best.t, active, SameTriangle{block, lane});
+            if (none(hits.hit)) continue;
+            best.template update<query>(hits.hit, hits.t, hits.u, hits.v,
+                                        Int<N, Isa>(block.prim_id[lane]), instance_id);
         }
-    }
-
-private:
-    /// Not inlined, to leave the registers to the test that most triangles fail.
-    [[gnu::noinline]] void decide(const TriangleBlock& block, int lane,
-                                  Mask<N, Isa> candidates) const {
-        const TriangleHits<N, Isa> hits =
-            decide_hits<directions>(ray, best.t, candidates, SameTriangle{block, lane});
-        best.template update<query>(hits.hit, hits.t, hits.u, hits.v,
-                                    Int<N, Isa>(block.prim_id[lane]), instance_id);
     }
 };
 
@@ -85,20 +77,21 @@ struct SingleLeaf {
         ray.broadcast(shear);
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
             const TriangleBlock& block = tree.blocks[b];
-            const M candidates = may_hit<Directions::kShared>(shear, BlockTriangles{block});
+            const auto sheared = packet::shear<Directions::kShared>(shear, BlockTriangles{block});
+            const M candidates = sheared.may_hit();
             if (none(candidates)) continue;
-            decide(block, candidates.bits());
+            HitRays<kBlockSize, Isa> hit_rays;
+            ray.broadcast(hit_rays);
+            take(block,
+                 decide_hits(sheared, hit_rays, F(best.t.r[0]), candidates, BlockTriangles{block}));
             if (query == Query::kAny && best.t.r[0] == kNever) return;
         }
     }
 
 private:
-    /// Not inlined, as above.
-    [[gnu::noinline]] void decide(const TriangleBlock& block, std::uint32_t candidates) const {
-        PreparedRays<kBlockSize, Isa> rays;
-        ray.broadcast(rays);
-        const TriangleHits<kBlockSize, Isa> hits = decide_hits<Directions::kShared>(
-            rays, F(best.t.r[0]), M::from_bits(candidates), BlockTriangles{block});
+    /// Keeps the nearest.
+    PACKET_INLINE void take(const TriangleBlock& block,
+                            const TriangleHits<kBlockSize, Isa>& hits) const {
         const std::uint32_t bits = hits.hit.bits();
         if (bits == 0) return;
         float t[kBlockSize], u[kBlockSize], v[kBlockSize];

@@ -24,32 +24,42 @@ struct RayLanes {
     F org[3], dir[3], tnear, tfar;
 };
 
-/// What the triangle test needs: the shear that turns rays into the unit z axis.
+/// What moves triangles into the space of rays: the shear that turns rays into the z axis.
 template <int N, class Isa>
 struct ShearRays {
     using F = Float<N, Isa>;
     using M = Mask<N, Isa>;
 
     F org[3];  ///< kShared: axes in the order `axis`, else x y z
-    F shear_x, shear_y, scale_z;
+    F shear_x, shear_y;
     M z_is_x, z_is_y;  ///< kMixed: which axis is longest
     int axis[3];       ///< kShared: the axes that become x, y, z; else 0 1 2
 };
 
-/// Rays prepared for the boxes and triangles of one tree. Arrays of two are indexed by the side of
-/// a box: 0 its lower planes, 1 the upper ones.
+/// What decides where rays hit the triangles that they may hit. Arrays of two are indexed by the
+/// side of a box: 0 its lower planes, 1 the upper ones.
+template <int N, class Isa>
+struct HitRays {
+    using F = Float<N, Isa>;
+
+    F tnear;
+    F scale_z;  ///< t of a unit along the longest axis
+    /// For triangles' boxes, by the contract's form: t = (plane - org[side]) * reciprocal.
+    F org[2][3], reciprocal[3];
+};
+
+/// Rays prepared for the boxes and triangles of one tree.
 template <int N, class Isa>
 struct PreparedRays {
     using F = Float<N, Isa>;
 
-    F tnear;
-    /// For nodes, by the quick form: t = plane * inv_dir - shift[side].
+    /// For nodes, by the quick form: t = plane * inv_dir - shift. kShared: [0] for the planes that
+    /// are met first, [1] for the others; else for the lower and the upper planes.
     F inv_dir[3], shift[2][3];
     int near_side[3];  ///< kShared: per axis, the plane of a box that is met first
     Directions directions;
     ShearRays<N, Isa> shear;
-    /// For triangles' boxes, by the contract's form: t = (plane - org[side]) * reciprocal.
-    F org[2][3], reciprocal[3];
+    HitRays<N, Isa> hit;
 };
 
 /// What the triangle test needs of one register's lanes.
@@ -62,16 +72,15 @@ PACKET_INLINE auto part(const ShearRays<N, Isa>& ray, int i) {
     }
     out.shear_x = part(ray.shear_x, i);
     out.shear_y = part(ray.shear_y, i);
-    out.scale_z = part(ray.scale_z, i);
     out.z_is_x = part(ray.z_is_x, i);
     out.z_is_y = part(ray.z_is_y, i);
     return out;
 }
 template <int N, class Isa>
-PACKET_INLINE auto part(const PreparedRays<N, Isa>& ray, int i) {
-    PreparedRays<kPartSize<N, Isa>, Isa> out;
+PACKET_INLINE auto part(const HitRays<N, Isa>& ray, int i) {
+    HitRays<kPartSize<N, Isa>, Isa> out;
     out.tnear = part(ray.tnear, i);
-    out.shear = part(ray.shear, i);
+    out.scale_z = part(ray.scale_z, i);
     for (int a = 0; a < 3; ++a) {
         out.org[0][a] = part(ray.org[0][a], i);
         out.org[1][a] = part(ray.org[1][a], i);
@@ -141,11 +150,11 @@ PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Is
     using F = Float<N, Isa>;
     constexpr float kSteepest = 0x1p32f;
     constexpr float kInfinity = __builtin_huge_valf();
-    const F least =
-        min(abs(out.reciprocal[0]), min(abs(out.reciprocal[1]), abs(out.reciprocal[2])));
+    const F(&reciprocal)[3] = out.hit.reciprocal;
+    const F least = min(abs(reciprocal[0]), min(abs(reciprocal[1]), abs(reciprocal[2])));
     const F limit = min(F(kLargestFloat), least * F(kSteepest));
     for (int a = 0; a < 3; ++a) {
-        const F inv_dir = max(F(0.0f) - limit, min(limit, out.reciprocal[a]));
+        const F inv_dir = max(F(0.0f) - limit, min(limit, reciprocal[a]));
         const F more = growth + growth + abs(ray.org[a]) * F(4.0f * kOriginSlack);
         const F lower = (ray.org[a] + more) * inv_dir, upper = (ray.org[a] - more) * inv_dir;
         // if (|lower| > largest || |upper| > largest) 0 * plane - shift is -inf or inf, which
@@ -166,15 +175,16 @@ PACKET_INLINE void prepare_boxes(PreparedRays<N, Isa>& out, const TreeView& tree
     for (int a = 0; a < 3; ++a) {
         // Far from the world's origin org + e would round back to org: a further ulp of org stays.
         const F growth = e + abs(ray.org[a]) * F(kOriginSlack);
-        out.org[0][a] = ray.org[a] + growth;
-        out.org[1][a] = ray.org[a] - growth;
-        out.reciprocal[a] = safe_reciprocal(ray.dir[a]);
+        out.hit.org[0][a] = ray.org[a] + growth;
+        out.hit.org[1][a] = ray.org[a] - growth;
+        out.hit.reciprocal[a] = safe_reciprocal(ray.dir[a]);
     }
     prepare_nodes(out, ray, e);
-    out.tnear = ray.tnear;
+    out.hit.tnear = ray.tnear;
 }
 
-/// Notes whether the active lanes share octant and longest axis, and if so, which.
+/// Notes whether the active lanes share octant and longest axis, and if so, which; then puts shifts
+/// into the order in which planes are met.
 template <int N, class Isa>
 PACKET_INLINE void prepare_directions(PreparedRays<N, Isa>& out, std::uint32_t active) {
     out.directions = Directions::kShared;
@@ -183,9 +193,16 @@ PACKET_INLINE void prepare_directions(PreparedRays<N, Isa>& out, std::uint32_t a
     const int z_axis = x != 0 ? 0 : y != 0 ? 1 : 2;
     if ((x != 0 && x != active) || (y != 0 && y != active)) out.directions = Directions::kMixed;
     for (int a = 0; a < 3; ++a) {
-        const std::uint32_t negative = (out.reciprocal[a] < Float<N, Isa>(0.0f)).bits() & active;
+        const std::uint32_t negative =
+            (out.hit.reciprocal[a] < Float<N, Isa>(0.0f)).bits() & active;
         if (negative != 0 && negative != active) out.directions = Directions::kMixed;
         out.near_side[a] = negative != 0 ? 1 : 0;
+    }
+    for (int a = 0; a < 3 && out.directions == Directions::kShared; ++a) {
+        if (out.near_side[a] == 0) continue;
+        const Float<N, Isa> lower = out.shift[0][a];
+        out.shift[0][a] = out.shift[1][a];
+        out.shift[1][a] = lower;
     }
     constexpr int kNext[3] = {1, 2, 0};
     const int z = out.directions == Directions::kShared ? z_axis : 2;
@@ -204,14 +221,15 @@ PACKET_INLINE Float3<N, Isa> rotate_axes(const ShearRays<N, Isa>& ray,
 }
 
 template <int N, class Isa>
-PACKET_INLINE void prepare_shear(ShearRays<N, Isa>& shear, const RayLanes<N, Isa>& ray) {
+PACKET_INLINE void prepare_shear(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray) {
+    ShearRays<N, Isa>& shear = out.shear;
     const auto x = abs(ray.dir[0]), y = abs(ray.dir[1]), z = abs(ray.dir[2]);
     shear.z_is_x = (x >= y) & (x >= z);
     shear.z_is_y = ~shear.z_is_x & (y >= z);
     const Float3<N, Isa> d = rotate_axes(shear, ray.dir);
     shear.shear_x = d.x / d.z;
     shear.shear_y = d.y / d.z;
-    shear.scale_z = Float<N, Isa>(1.0f) / d.z;
+    out.hit.scale_z = Float<N, Isa>(1.0f) / d.z;
 }
 
 /// All of it for a packet, whose `active` lanes are usable.
@@ -219,7 +237,7 @@ template <int N, class Isa>
 PACKET_INLINE void prepare(PreparedRays<N, Isa>& out, const TreeView& tree,
                            const RayLanes<N, Isa>& ray, std::uint32_t active) {
     prepare_boxes(out, tree, ray);
-    prepare_shear(out.shear, ray);
+    prepare_shear(out, ray);
     prepare_directions(out, active);
     for (int a = 0; a < 3; ++a) {
         // Read by a constant index in each arm: a computed one would put the lanes into memory.

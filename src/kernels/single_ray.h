@@ -26,24 +26,24 @@ PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLan
     using F = Float<kSingleLanes, Isa>;
     PreparedRays<kSingleLanes, Isa> from;
     prepare_boxes(from, tree, ray);
-    prepare_shear(from.shear, ray);
-    from.tnear.store(out.tnear);
+    prepare_shear(from, ray);
+    from.hit.tnear.store(out.tnear);
     const Float3<kSingleLanes, Isa> shear_org = rotate_axes(from.shear, ray.org);
     shear_org.x.store(out.shear_org[0]);
     shear_org.y.store(out.shear_org[1]);
     shear_org.z.store(out.shear_org[2]);
     from.shear.shear_x.store(out.shear_x);
     from.shear.shear_y.store(out.shear_y);
-    from.shear.scale_z.store(out.scale_z);
+    from.hit.scale_z.store(out.scale_z);
     out.z_is_x = from.shear.z_is_x.bits();
     out.z_is_y = from.shear.z_is_y.bits();
     for (int a = 0; a < 3; ++a) {
         from.inv_dir[a].store(out.inv_dir[a]);
-        from.reciprocal[a].store(out.reciprocal[a]);
-        out.negative[a] = (from.reciprocal[a] < F(0.0f)).bits();
+        from.hit.reciprocal[a].store(out.reciprocal[a]);
+        out.negative[a] = (from.hit.reciprocal[a] < F(0.0f)).bits();
         for (int side = 0; side < 2; ++side) {
             from.shift[side][a].store(out.shift[side][a]);
-            from.org[side][a].store(out.org[side][a]);
+            from.hit.org[side][a].store(out.org[side][a]);
         }
     }
 }
@@ -105,11 +105,11 @@ struct SingleRay {
         }
         out.shear_x = lanes.shear_x[lane];
         out.shear_y = lanes.shear_y[lane];
-        out.scale_z = lanes.scale_z[lane];
     }
+    /// Fills what decides, likewise.
     template <int N, class Isa>
-    PACKET_INLINE void broadcast(PreparedRays<N, Isa>& out) const {
-        broadcast(out.shear);
+    PACKET_INLINE void broadcast(HitRays<N, Isa>& out) const {
+        out.scale_z = lanes.scale_z[lane];
         out.tnear = lanes.tnear[lane];
         for (int a = 0; a < 3; ++a) {
             out.reciprocal[a] = lanes.reciprocal[a][lane];

@@ -53,8 +53,8 @@ private:
         const BeamBounds bounds = bound_rays(rays + first, best + first, last - first);
         const int z = bounds.axis[2];
         const float way = tree.upper[z] - tree.lower[z];
-        const bool is_one_packet = last - first == 1;
-        const bool is_narrow = is_one_packet || bounds.width(way) <= kWidestBeam * way;
+        const float length = bounds.end - bounds.begin;
+        const bool is_narrow = bounds.width(length < way ? length : way) <= kWidestBeam * way;
         if (!bounds.is_sound || !is_narrow) return false;
         TileWalk<query, N, Isa, Stats> walk(tree, rays + first, best + first, bounds, instance_id,
                                             stats);

@@ -46,7 +46,9 @@ public:
           best_(best),
           beam_(bounds),
           instance_id_(instance_id),
-          stats_(stats) {}
+          stats_(stats) {
+        for (int a = 0; a < 3; ++a) near_side_[a] = rays[0].near_side[a];
+    }
 
     PACKET_INLINE void run(std::uint32_t packets) {
         looking_ = packets;
@@ -69,7 +71,7 @@ public:
     }
 
 private:
-    /// Pushes the children that the beam meets, the nearest last.
+    /// Pushes the children that the beam meets, for closest-hit the nearest last.
     PACKET_INLINE void push_children(const WideNode& node, std::uint32_t packets) {
         Float<kWideSize, Isa> depths;
         std::uint32_t bits = beam_.meets(node, depths);
@@ -79,40 +81,50 @@ private:
         for (; bits != 0; bits &= bits - 1) {
             const int child = __builtin_ctz(bits);
             int place = size_++;
-            for (; place > bottom && stack_[place - 1].depth < depth[child]; --place) {
-                stack_[place] = stack_[place - 1];
+            if constexpr (query == Query::kClosest) {
+                for (; place > bottom && stack_[place - 1].depth < depth[child]; --place) {
+                    stack_[place] = stack_[place - 1];
+                }
             }
             stack_[place] = {&node, static_cast<std::uint32_t>(child), packets, depth[child]};
         }
     }
 
-    /// The lanes of a packet that meet a child's box.
-    PACKET_INLINE M lanes(const WideNode& node, int child, int packet) const {
-        const PreparedRays<N, Isa>& ray = rays_[packet];
-        Interval<N, Isa> box;
-        for (int a = 0; a < 3; ++a) {
-            const int near = ray.near_side[a];
-            const F t_near = multiply_subtract(F(node.plane[near][a][child]), ray.inv_dir[a],
-                                               ray.shift[near][a]);
-            const F t_far = multiply_subtract(F(node.plane[1 - near][a][child]), ray.inv_dir[a],
-                                              ray.shift[1 - near][a]);
-            box.enter = a == 0 ? t_near : max(box.enter, t_near);
-            box.exit = a == 0 ? t_far : min(box.exit, t_far);
+    /// A child's planes in all lanes, in the order in which they are met.
+    struct ChildPlanes {
+        F near[3], far[3];
+
+        PACKET_INLINE ChildPlanes(const WideNode& node, std::uint32_t child,
+                                  const int (&near_side)[3]) {
+            for (int a = 0; a < 3; ++a) {
+                near[a] = node.plane[near_side[a]][a][child];
+                far[a] = node.plane[1 - near_side[a]][a][child];
+            }
         }
-        return meets(ray, box, best_[packet].t);
-    }
+        PACKET_INLINE M meets(const PreparedRays<N, Isa>& ray, const F& best_t) const {
+            Interval<N, Isa> box;
+            for (int a = 0; a < 3; ++a) {
+                const F t_near = multiply_subtract(near[a], ray.inv_dir[a], ray.shift[0][a]);
+                const F t_far = multiply_subtract(far[a], ray.inv_dir[a], ray.shift[1][a]);
+                box.enter = a == 0 ? t_near : max(box.enter, t_near);
+                box.exit = a == 0 ? t_far : min(box.exit, t_far);
+            }
+            return packet::meets(ray, box, best_t);
+        }
+    };
 
     /// The packets that meet the child's box; in active_ their lanes that do.
     PACKET_INLINE std::uint32_t active_packets(const TileEntry& entry) {
-        const int child = static_cast<int>(entry.child);
-        std::uint32_t out = 0;
-        for (std::uint32_t left = entry.packets & looking_; left != 0; left &= left - 1) {
+        std::uint32_t left = entry.packets & looking_, out = 0;
+        if (left == 0) return 0;
+        const ChildPlanes planes(*entry.node, entry.child, near_side_);
+        for (; left != 0; left &= left - 1) {
             const int p = __builtin_ctz(left);
-            const M active = lanes(*entry.node, child, p);
+            const M active = planes.meets(rays_[p], best_[p].t);
             if (none(active)) continue;
             active_[p] = active;
             out |= 1u << p;
-            if (!entry.node->child[child].is_leaf()) stats_.visit(count(active), N);
+            if (!entry.node->child[entry.child].is_leaf()) stats_.visit(count(active), N);
         }
         return out;
     }
@@ -142,6 +154,7 @@ private:
     const PreparedRays<N, Isa>* rays_;
     BestHits<N, Isa>* best_;
     Beam<Isa> beam_;
+    int near_side_[3];
     std::int32_t instance_id_;
     Stats& stats_;
     std::uint32_t looking_ = 0;  ///< packets that may still find something

@@ -2,8 +2,10 @@
 #pragma once
 
 #include "kernels/counters.h"
+#include "kernels/direction_class.h"
 #include "kernels/kernel_table.h"
 #include "kernels/tile_scene_walk.h"
+#include "kernels/transpose.h"
 #include "kernels/triangle_box_axes.h"
 #include "kernels/triangle_box_clip.h"
 
@@ -143,10 +145,25 @@ PACKET_INLINE std::size_t place(const TraceBatch& batch, std::size_t i) {
     return batch.order != nullptr ? batch.order[i] : i;
 }
 
+/// Eight rays become columns: a ray has as many numbers.
+template <int kCount, class Isa>
+PACKET_INLINE void gather_8_rays(const TraceBatch& batch, std::size_t begin,
+                                 RayArrays<kCount, Isa>& out, int first) {
+    static_assert(sizeof(Ray) == 8 * sizeof(float));
+    Floats8 rows[8];
+    for (std::size_t i = 0; i < 8; ++i) rows[i] = load8(batch.rays + place(batch, begin + i));
+    transpose(rows);
+    for (int i = 0; i < 8; ++i) store8(out.component[i] + first, rows[i]);
+}
+
 template <int kCount, class Isa>
 PACKET_INLINE RayColumns gather_rays(const TraceBatch& batch, std::size_t begin, int count,
                                      RayArrays<kCount, Isa>& out) {
-    for (int i = 0; i < count; ++i) {
+    int i = 0;
+    for (; i + 8 <= count; i += 8) {
+        gather_8_rays(batch, begin + static_cast<std::size_t>(i), out, i);
+    }
+    for (; i < count; ++i) {
         const Ray& ray = batch.rays[place(batch, begin + static_cast<std::size_t>(i))];
         out.component[0][i] = ray.org.x, out.component[1][i] = ray.org.y;
         out.component[2][i] = ray.org.z, out.component[3][i] = ray.tnear;
@@ -154,23 +171,55 @@ PACKET_INLINE RayColumns gather_rays(const TraceBatch& batch, std::size_t begin,
         out.component[6][i] = ray.dir.z, out.component[7][i] = ray.tfar;
     }
     RayColumns columns;
-    for (int i = 0; i < 8; ++i) columns.component[i] = out.component[i];
+    for (int c = 0; c < 8; ++c) columns.component[c] = out.component[c];
     return columns;
+}
+
+template <int kCount, class Isa>
+PACKET_INLINE void scatter_hit(const SceneView& scene, const HitArrays<kCount, Isa>& hits, int i,
+                               Hit& out) {
+    out.t = hits.t[i], out.u = hits.u[i], out.v = hits.v[i];
+    out.prim_id = static_cast<std::uint32_t>(hits.prim_id[i]);
+    out.mesh_id = mesh_of(scene, hits.instance_id[i]);
+    out.instance_id = static_cast<std::uint32_t>(hits.instance_id[i]);
+}
+
+/// Eight hits become rows of six numbers.
+template <int kCount, class Isa>
+PACKET_INLINE void scatter_8_hits(const TraceBatch& batch, std::size_t begin,
+                                  const HitArrays<kCount, Isa>& hits, int first) {
+    static_assert(sizeof(Hit) == 6 * sizeof(float));
+    std::uint32_t mesh_id[8];
+    for (int i = 0; i < 8; ++i) mesh_id[i] = mesh_of(*batch.scene, hits.instance_id[first + i]);
+    const Floats8 ids = load8(hits.prim_id + first), meshes = load8(mesh_id),
+                  instances = load8(hits.instance_id + first);
+    Floats8 rows[8] = {load8(hits.t + first),
+                       load8(hits.u + first),
+                       load8(hits.v + first),
+                       ids,
+                       meshes,
+                       instances,
+                       instances,
+                       instances};
+    transpose(rows);
+    for (std::size_t i = 0; i < 8; ++i) store6(&batch.hits[place(batch, begin + i)], rows[i]);
 }
 
 template <Query query, int kCount, class Isa>
 PACKET_INLINE void scatter_hits(const TraceBatch& batch, std::size_t begin, int count,
                                 const HitArrays<kCount, Isa>& hits) {
-    for (int i = 0; i < count; ++i) {
+    int i = 0;
+    if constexpr (query == Query::kClosest) {
+        for (; i + 8 <= count; i += 8) {
+            scatter_8_hits(batch, begin + static_cast<std::size_t>(i), hits, i);
+        }
+    }
+    for (; i < count; ++i) {
         const std::size_t at = place(batch, begin + static_cast<std::size_t>(i));
         if constexpr (query == Query::kAny) {
             batch.occluded[at] = hits.prim_id[i] >= 0;
         } else {
-            Hit& hit = batch.hits[at];
-            hit.t = hits.t[i], hit.u = hits.u[i], hit.v = hits.v[i];
-            hit.prim_id = static_cast<std::uint32_t>(hits.prim_id[i]);
-            hit.mesh_id = mesh_of(*batch.scene, hits.instance_id[i]);
-            hit.instance_id = static_cast<std::uint32_t>(hits.instance_id[i]);
+            scatter_hit(*batch.scene, hits, i, batch.hits[at]);
         }
     }
 }
@@ -205,20 +254,73 @@ void trace_batch_by_packets(const TraceBatch& batch) noexcept {
     });
 }
 
+/// A batch whose scene is one tree, a tile's rays at a time.
 template <Query query, class Isa, class Stats>
-void trace_batch_by_tiles(const TraceBatch& batch) noexcept {
-    constexpr int N = kTileLanes<Isa>;
-    Stats stats(batch.stats);
-    trace_by<query, kTileRays, Isa>(batch, [&](const RayColumns& rays, int count, auto& out) {
-        const SceneView& scene = *batch.scene;
-        if (scene.is_single_mesh && scene.instances[0].tree->is_tree()) {
-            trace_tile<query, N>(scene, rays, count, stats, out);
+class TileBatch {
+public:
+    PACKET_INLINE explicit TileBatch(const TraceBatch& batch)
+        : batch_(batch), stats_(batch.stats) {}
+
+    PACKET_INLINE void trace() {
+        for (std::size_t begin = 0; begin < batch_.count; begin += kTileRays) {
+            const std::size_t left = batch_.count - begin;
+            trace_rays(begin, left < kTileRays ? static_cast<int>(left) : kTileRays);
+        }
+    }
+
+private:
+    static constexpr int N = kTileLanes<Isa>;
+
+    PACKET_INLINE void trace_rays(std::size_t begin, int count) {
+        const RayColumns columns = gather_rays(batch_, begin, count, rays_);
+        if (share_class<N, Isa>(columns.component + 4, count)) {
+            trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_);
+            scatter_hits<query>(batch_, begin, count, hits_);
             return;
         }
-        for (int first = 0; first < count; first += N) {
-            trace_packet<query, N>(scene, rays, lanes_below<N>(count, first), stats, out, first);
+        const ClassRuns<kTileRays> runs(columns.component + 4, count);
+        if (runs.used > kMostClasses) {
+            for (int first = 0; first < count; first += kSingleLanes) {
+                trace_singly<query>(*batch_.scene, columns, lanes_below<kSingleLanes>(count, first),
+                                    stats_, hits_, first);
+            }
+            scatter_hits<query>(batch_, begin, count, hits_);
+            return;
         }
-    });
+        trace_runs(begin, runs);
+    }
+
+    /// The rays of each class are a tile.
+    PACKET_INLINE void trace_runs(std::size_t begin, const ClassRuns<kTileRays>& runs) {
+        std::uint32_t order[kTileRays];
+        for (int i = 0; i < runs.begin[kDirectionClasses]; ++i) {
+            order[i] = static_cast<std::uint32_t>(place(batch_, begin + runs.ray[i]));
+        }
+        for (int c = 0; c < kDirectionClasses; ++c) {
+            const int count = runs.begin[c + 1] - runs.begin[c];
+            if (count == 0) continue;
+            TraceBatch run = batch_;
+            run.order = order + runs.begin[c];
+            const RayColumns columns = gather_rays(run, 0, count, rays_);
+            trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_);
+            scatter_hits<query>(run, 0, count, hits_);
+        }
+    }
+
+    const TraceBatch& batch_;
+    Stats stats_;
+    RayArrays<kTileRays, Isa> rays_ = {};
+    HitArrays<kTileRays, Isa> hits_;
+};
+
+template <Query query, class Isa, class Stats>
+void trace_batch_by_tiles(const TraceBatch& batch) noexcept {
+    const SceneView& scene = *batch.scene;
+    if (scene.is_single_mesh && scene.instances[0].tree->is_tree()) {
+        TileBatch<query, Isa, Stats>(batch).trace();
+    } else {
+        trace_batch_by_packets<query, kTileLanes<Isa>, Isa, Stats>(batch);
+    }
 }
 
 template <Query query, int N, class Isa>

@@ -1,0 +1,45 @@
+// Rows of eight numbers to columns and back: how rays and hits, which lie in memory one after the
+// other, become lanes. Numbers are moved as bits, so integers may travel as floats.
+#pragma once
+
+#include "core/macros.h"
+
+namespace packet {
+
+/// Eight floats, in as many registers as the ISA takes for them: compilers lower shuffles of it.
+using Floats8 [[gnu::vector_size(32)]] = float;
+using UnalignedFloats8 [[gnu::vector_size(32), gnu::aligned(4), gnu::may_alias]] = float;
+
+PACKET_INLINE Floats8 load8(const void* from) {
+    return *static_cast<const UnalignedFloats8*>(from);
+}
+PACKET_INLINE void store8(void* to, const Floats8& row) {
+    *static_cast<UnalignedFloats8*>(to) = row;
+}
+/// Stores the first six.
+PACKET_INLINE void store6(void* to, const Floats8& row) {
+    __builtin_memcpy(to, &row, 6 * sizeof(float));
+}
+
+/// Transposes 8 x 8: pairs within quarters, quarters within halves, then the halves.
+PACKET_INLINE void transpose(Floats8 (&row)[8]) {
+    Floats8 pair[8], quarter[8];
+    for (int i = 0; i < 8; i += 2) {
+        pair[i] = __builtin_shufflevector(row[i], row[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+        pair[i + 1] = __builtin_shufflevector(row[i], row[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    for (int i = 0; i < 8; i += 4) {
+        for (int k = 0; k < 2; ++k) {
+            const Floats8 &a = pair[i + k], &b = pair[i + k + 2];
+            quarter[i + 2 * k] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
+            quarter[i + 2 * k + 1] = __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        const Floats8 &a = quarter[i], &b = quarter[i + 4];
+        row[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11);
+        row[i + 4] = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
+    }
+}
+
+}  // namespace packet
