@@ -1,7 +1,6 @@
 #include "contest.h"
 
-#include <algorithm>
-#include <chrono>
+#include <timing.h>
 
 namespace packet::bench {
 namespace {
@@ -42,21 +41,9 @@ Agreement compare_answers(MeshView mesh, const RaySet& set, const Contender& fir
     return compare_hits(mesh, set.rays, a.hits, b.hits);
 }
 
-double seconds_of(const Contender& contender, const RaySet& set, Answers& answers, int threads) {
-    using Clock = std::chrono::steady_clock;
-    const Clock::time_point begin = Clock::now();
-    contender.trace(set, answers, threads);
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
 }  // namespace
 
-double Score::median_seconds() const {
-    std::vector<double> sorted = seconds;
-    std::ranges::sort(sorted);
-    const std::size_t half = sorted.size() / 2;
-    return sorted.size() % 2 != 0 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
-}
+double Score::median_seconds() const { return tools::median(seconds); }
 
 std::vector<Score> hold(const Contest& contest, MeshView mesh, const RaySet& set,
                         std::span<const Contender> contenders) {
@@ -71,7 +58,8 @@ std::vector<Score> hold(const Contest& contest, MeshView mesh, const RaySet& set
     Answers answers = room_for(set);
     for (int repeat = 0; repeat < contest.repeats; ++repeat) {
         for (Score& score : scores) {
-            score.seconds.push_back(seconds_of(*score.contender, set, answers, contest.threads));
+            score.seconds.push_back(
+                tools::seconds_of([&] { score.contender->trace(set, answers, contest.threads); }));
         }
     }
     return scores;

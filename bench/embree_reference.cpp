@@ -3,8 +3,11 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <timing.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <functional>
 #include <stdexcept>
@@ -226,7 +229,7 @@ RTCBuildQuality to_embree(EmbreeQuality quality) {
 }
 
 // The scene takes the geometry over, and the device keeps the arrays.
-void attach(RTCDevice device, RTCScene scene, MeshView mesh) {
+void attach(RTCDevice device, RTCScene scene, MeshView mesh, RTCBuildQuality quality) {
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     void* positions =
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -236,6 +239,8 @@ void attach(RTCDevice device, RTCScene scene, MeshView mesh) {
     if (positions && triangles) {
         std::ranges::copy(mesh.positions, static_cast<glm::vec3*>(positions));
         std::ranges::copy(mesh.triangles, static_cast<glm::uvec3*>(triangles));
+        // Low quality is only had if the geometry asks for it, too; high is the scene's alone.
+        if (quality == RTC_BUILD_QUALITY_LOW) rtcSetGeometryBuildQuality(geometry, quality);
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(scene, geometry);
     }
@@ -250,6 +255,12 @@ struct FirstError {
 void keep_first_error(void* user, RTCError code, const char* message) {
     auto& error = *static_cast<FirstError*>(user);
     if (error.code == RTC_ERROR_NONE) error = {code, message ? message : "no message"};
+}
+
+// What Embree's threads take less what they give back.
+bool count_bytes(void* user, ssize_t bytes, bool /*after*/) {
+    *static_cast<std::atomic<std::ptrdiff_t>*>(user) += bytes;
+    return true;
 }
 
 constexpr EmbreeModeName kModes[] = {
@@ -278,9 +289,13 @@ EmbreeScene::EmbreeScene(MeshView mesh, EmbreeQuality quality, EmbreeTest test) 
     rtcSetDeviceErrorFunction(device, keep_first_error, &error);
     scene_.reset(rtcNewScene(device), rtcReleaseScene);
     rtcSetSceneBuildQuality(scene_.get(), to_embree(quality));
+    std::atomic<std::ptrdiff_t> bytes = 0;
     if (test == EmbreeTest::kRobust) rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
-    attach(device, scene_.get(), mesh);
-    rtcCommitScene(scene_.get());
+    attach(device, scene_.get(), mesh, to_embree(quality));
+    rtcSetDeviceMemoryMonitorFunction(device, count_bytes, &bytes);
+    build_.seconds = tools::seconds_of([&] { rtcCommitScene(scene_.get()); });
+    build_.bytes = static_cast<std::size_t>(bytes);
+    rtcSetDeviceMemoryMonitorFunction(device, nullptr, nullptr);
     rtcSetDeviceErrorFunction(device, nullptr, nullptr);
     rtcReleaseDevice(device);  // the scene keeps it alive
     if (error.code != RTC_ERROR_NONE) throw std::runtime_error("Embree: " + error.message);

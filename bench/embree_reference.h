@@ -6,6 +6,7 @@
 #include <packet/mesh.h>
 #include <packet/ray.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -26,6 +27,12 @@ enum class EmbreeTest : std::uint8_t { kFast, kRobust };
 /// ones pass Embree's hint that neighbouring rays go alike.
 enum class EmbreeMode : std::uint8_t { k1, k8, k8Coherent, k16, k16Coherent, k1M, k1MCoherent };
 
+/// What it took Embree to build.
+struct EmbreeBuild {
+    double seconds;     ///< from arrays in memory to what can be traced
+    std::size_t bytes;  ///< of what is left then, but for the arrays
+};
+
 struct EmbreeModeName {
     EmbreeMode mode;
     std::string_view name;
@@ -43,6 +50,8 @@ public:
     explicit EmbreeScene(MeshView mesh, EmbreeQuality quality = EmbreeQuality::kMedium,
                          EmbreeTest test = EmbreeTest::kFast);
 
+    [[nodiscard]] const EmbreeBuild& build() const noexcept { return build_; }
+
     /// As packet::trace_closest, with mesh and instance 0. Among hits at equal `t` any may be
     /// returned. Rays need finite components and `0 <= tnear`. `threads` is 1 or more.
     void trace_closest(EmbreeMode mode, std::span<const Ray> rays, std::span<Hit> hits,
@@ -53,6 +62,7 @@ public:
 
 private:
     std::shared_ptr<RTCSceneTy> scene_;
+    EmbreeBuild build_{};
 };
 
 }  // namespace packet::bench

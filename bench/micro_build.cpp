@@ -1,5 +1,6 @@
 // How fast structures are built, how large they are and what they are worth.
-#include "micro_build.h"
+#include "course.h"
+#include "micro.h"
 
 #include "generate.h"
 
@@ -9,7 +10,6 @@
 #include <fmt/core.h>
 
 #include <cstddef>
-#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -30,12 +30,14 @@ void run(benchmark::State& state, Scene scene, const BuildOptions& options) {
     state.counters["sah_cost"] = stats.sah_cost;
 }
 
-void add(std::string_view scene_kind, const std::shared_ptr<const Scene>& scene,
-         const AccelName& accel, int threads) {
+void add(std::string_view scene_kind, const Lazy<Scene>& scene, const AccelName& accel,
+         int threads) {
     BuildOptions options;
     options.accel = accel.kind;
     options.threads = threads;
-    const auto body = [scene, options](benchmark::State& state) { run(state, *scene, options); };
+    const auto body = [scene, options](benchmark::State& state) {
+        run(state, scene.get(), options);
+    };
     const std::string name =
         fmt::format("build/{}/{}/{}", scene_kind, accel.name, threads == 0 ? "all" : "1");
     benchmark::RegisterBenchmark(name.c_str(), body)
@@ -48,8 +50,8 @@ void add(std::string_view scene_kind, const std::shared_ptr<const Scene>& scene,
 
 void add_build_benchmarks() {
     for (const std::string_view scene_kind : {"terrain", "city", "hairball", "soup"}) {
-        const auto scene =
-            std::make_shared<const Scene>(make_scene(tools::generate(scene_kind, kTriangleCount)));
+        const Lazy<Scene> scene(
+            [=] { return make_scene(tools::generate(scene_kind, kTriangleCount)); });
         for (const AccelName& accel : accel_names()) {
             for (const int threads : {1, 0}) add(scene_kind, scene, accel, threads);
         }

@@ -1,6 +1,6 @@
 // Triangle-box overlap as a grid's builder asks for it: triangles a few cells large, each against
 // runs of eight cells that its own box meets.
-#include "micro_overlap.h"
+#include "micro.h"
 
 #include "build/overlap.h"
 #include "dispatch/dispatch.h"

@@ -1,5 +1,6 @@
 // packet_bench: traces scenes with our kernels and with Embree, on the same rays, side by side.
 // docs/benchmarking.md says how it measures and how to read it.
+#include "program.h"
 #include "report.h"
 
 #include <packet/gltf.h>
@@ -7,17 +8,14 @@
 #include <packet/trace.h>
 
 #include <fmt/core.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <camera.h>
 #include <names.h>
 #include <options.h>
 #include <ray_kinds.h>
+#include <timing.h>
 
-#include <chrono>
-#include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -43,12 +41,6 @@ struct Options {
     bool json = false;
 };
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
 /// One scene as both sides hold it. Embree's trees are of the qualities it is fastest with.
 class Arena {
 public:
@@ -56,9 +48,7 @@ public:
         : scene_(make_scene(load_gltf(path).scene.flatten())) {
         report_.scene = path.filename().string();
         report_.triangle_count = mesh().triangles.size();
-        const auto begin = Clock::now();
-        scene_.commit();
-        report_.builds.push_back({"ours", seconds_since(begin)});
+        report_.builds.push_back({"ours", tools::seconds_of([&] { scene_.commit(); })});
         for (const ModeName& mode : mode_names()) {
             contenders_.push_back(our_contender(scene_, mode));
         }
@@ -78,9 +68,8 @@ public:
 
 private:
     void add_embree(EmbreeQuality quality, std::string_view name, EmbreeTest test) {
-        const auto begin = Clock::now();
         const EmbreeScene scene(mesh(), quality, test);
-        report_.builds.push_back({name, seconds_since(begin)});
+        report_.builds.push_back({name, scene.build().seconds});
         for (const EmbreeModeName& mode : embree_modes()) {
             contenders_.push_back(embree_contender(scene, mode, name));
         }
@@ -137,17 +126,11 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace
 }  // namespace packet::bench
 
-int main(int argc, char** argv) try {
+int main(int argc, char** argv) {
     packet::bench::Options options;
-    CLI::App app("Traces scenes with our kernels and with Embree, on the same rays");
+    CLI::App app("Traces scenes with our kernels and with Embree, on the same rays",
+                 "packet_bench");
     packet::bench::add_options(app, options);
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
-    }
-    return packet::bench::run(options) ? 0 : 1;
-} catch (const std::exception& error) {
-    std::fprintf(stderr, "packet_bench: %s\n", error.what());
-    return 1;
+    return packet::bench::run_program(app, argc, argv,
+                                      [&] { return packet::bench::run(options) ? 0 : 1; });
 }

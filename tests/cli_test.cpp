@@ -132,7 +132,7 @@ TEST_CASE("unknown names list the valid ones") {
     const ProgramWithScene program;
     check_failure(program.run("tarce"), 2, "valid are: info, render, trace, rays, make");
     check_failure(program.run("make teapot -o x.glb"), 2,
-                  "valid are: terrain, city, hairball, soup, sphere");
+                  "valid are: terrain, city, hairball, soup, sphere, stadium");
     check_failure(program.run("rays scene.glb x-rays -o x.npy"), 2,
                   "valid are: primary, shadow, ao, diffuse, random");
     check_failure(program.run("render scene.glb -o x.png --shading toon"), 2,

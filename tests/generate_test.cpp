@@ -40,6 +40,8 @@ std::size_t fewest(std::string_view kind, std::size_t wished) {
         return static_cast<std::size_t>(std::max(n - std::sqrt(2.0 * n) - 2.0, 1.0));
     if (kind == "sphere")
         return static_cast<std::size_t>(std::max(n - 16.0 * std::sqrt(n / 8.0) - 8.0, 1.0));
+    if (kind == "stadium")
+        return static_cast<std::size_t>(std::max(n - 16.0 * std::sqrt(n) - 128.0, 1.0));
     if (kind == "city") return wished - std::min<std::size_t>(wished - 1, 11);
     if (kind == "hairball") return wished - std::min<std::size_t>(wished - 1, 5);
     return wished;
@@ -92,11 +94,9 @@ TEST_CASE("a seed gives the same scene on every platform") {
     const struct {
         std::string kind;
         std::uint64_t hash;
-    } expected[] = {{"terrain", 0xC1CF5C1B844CFE6Fu},
-                    {"city", 0x4742A6C8C127BEA6u},
-                    {"hairball", 0x73BCEE1BEFF4BF51u},
-                    {"soup", 0x959080B05F504C45u},
-                    {"sphere", 0x6675DF85A228E485u}};
+    } expected[] = {{"terrain", 0xC1CF5C1B844CFE6Fu},  {"city", 0x4742A6C8C127BEA6u},
+                    {"hairball", 0x73BCEE1BEFF4BF51u}, {"soup", 0x959080B05F504C45u},
+                    {"sphere", 0x6675DF85A228E485u},   {"stadium", 0xFE06342ECBE614DFu}};
     for (const auto& row : expected) {
         CAPTURE(row.kind);
         CHECK(hash(generate(row.kind, 10'000, 7)) == row.hash);
@@ -140,7 +140,8 @@ TEST_CASE("a sphere's vertices lie on it and its triangles face outward") {
 TEST_CASE("unknown kinds and impossible numbers are refused") {
     CHECK_THROWS_WITH_AS(
         (void)generate("teapot", 10),
-        "unknown kind of scene 'teapot'; valid are: terrain, city, hairball, soup, sphere", Error);
+        "unknown kind of scene 'teapot'; valid are: terrain, city, hairball, soup, sphere, stadium",
+        Error);
     CHECK_THROWS_AS((void)generate("soup", 0), Error);
     CHECK_THROWS_AS((void)generate("soup", kMaxTriangles + 1), Error);
 }

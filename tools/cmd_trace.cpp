@@ -3,12 +3,12 @@
 #include "npy.h"
 #include "options.h"
 #include "progress.h"
+#include "timing.h"
 #include "trace_report.h"
 
 #include <packet/gltf.h>
 
 #include <algorithm>
-#include <chrono>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -56,22 +56,14 @@ void trace(const Scene& scene, std::span<const Ray> rays, Query query, const Tra
     }
 }
 
-double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    const std::size_t middle = values.size() / 2;
-    return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
-}
-
 /// The median time of tracing, from rays in memory to hits in memory.
 double measure(const Scene& scene, std::span<const Ray> rays, const TraceCommand& command,
                Answer& answer) {
     std::vector<double> seconds;
     Progress progress("trace", static_cast<std::size_t>(command.repeats));
     for (int repeat = 0; repeat < command.repeats; ++repeat) {
-        const auto start = std::chrono::steady_clock::now();
-        trace(scene, rays, command.query.value, command.common.trace, answer);
-        const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-        seconds.push_back(time.count());
+        seconds.push_back(seconds_of(
+            [&] { trace(scene, rays, command.query.value, command.common.trace, answer); }));
         progress.advance(1);
     }
     return median(std::move(seconds));

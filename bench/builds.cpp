@@ -1,0 +1,117 @@
+// packet_builds: how fast our quickest builders are beside Embree's, over a million triangles, as a
+// table in Markdown. docs/benchmarking.md shows what it prints.
+#include "embree_reference.h"
+#include "markdown.h"
+#include "program.h"
+
+#include <packet/accel.h>
+#include <packet/scene.h>
+
+#include <fmt/core.h>
+
+#include <generate.h>
+#include <timing.h>
+
+#include <array>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace packet::bench {
+namespace {
+
+struct Options {
+    std::size_t triangles = 1'000'000;
+    int repeats = 5;
+};
+
+/// What a build came to. Embree does not tell the cost of its trees: it is 0 then.
+struct Built {
+    double seconds;
+    std::size_t bytes;
+    double sah_cost;
+};
+
+enum class Rival { kNone, kNext };
+
+struct Builder {
+    std::string name;
+    std::function<Built(const Scene&)> build;
+    Rival rival;  ///< whom it is compared with: the next one, which spends about as much on a tree
+};
+
+Builder our_builder(AccelKind accel, Rival rival) {
+    const auto build = [accel](const Scene& scene) {
+        Scene copy = scene;
+        BuildOptions options;
+        options.accel = accel;
+        const double seconds = tools::seconds_of([&] { copy.commit(options); });
+        return Built{seconds, copy.build_stats().bytes, copy.build_stats().sah_cost};
+    };
+    return {std::string(to_string(accel)), build, rival};
+}
+
+Builder embree_builder(EmbreeQuality quality, std::string_view name) {
+    const auto build = [quality](const Scene& scene) {
+        const EmbreeBuild built = EmbreeScene(scene.meshes()[0].view(), quality).build();
+        return Built{built.seconds, built.bytes, 0.0};
+    };
+    return {fmt::format("{} {}", embree_version(), name), build, Rival::kNone};
+}
+
+std::array<Builder, 5> all_builders() {
+    return {our_builder(AccelKind::kBvhMorton, Rival::kNext),
+            embree_builder(EmbreeQuality::kLow, "low"), our_builder(AccelKind::kBvh, Rival::kNext),
+            embree_builder(EmbreeQuality::kMedium, "medium"),
+            our_builder(AccelKind::kGrid, Rival::kNone)};
+}
+
+void hold_contest(std::string_view kind, const Options& options) {
+    const Scene scene = make_scene(tools::generate(kind, options.triangles));
+    const auto triangles = static_cast<double>(scene.triangle_count());
+    const std::array<Builder, 5> builders = all_builders();
+    std::array<std::vector<double>, 5> seconds;
+    std::array<Built, 5> last{};
+    for (int repeat = -1; repeat < options.repeats; ++repeat) {  // the first warms up
+        for (std::size_t i = 0; i < builders.size(); ++i) {
+            last[i] = builders[i].build(scene);
+            if (repeat >= 0) seconds[i].push_back(last[i].seconds);
+        }
+    }
+    for (std::size_t i = 0; i < builders.size(); ++i) {
+        const double median = tools::median(seconds[i]);
+        const bool has_rival = builders[i].rival == Rival::kNext;
+        print_cells({std::string(kind), builders[i].name, three_digits(1e-6 * triangles / median),
+                     has_rival ? fmt::format("{:.2f}", tools::median(seconds[i + 1]) / median) : "",
+                     fmt::format("{:.0f}", static_cast<double>(last[i].bytes) / triangles),
+                     last[i].sah_cost > 0.0 ? three_digits(last[i].sah_cost) : ""});
+    }
+}
+
+void run(const Options& options) {
+    print_table_head(
+        {"scene", "builder", "Mtriangles/s", "Embree = 1", "bytes/triangle", "SAH cost"});
+    for (const std::string_view kind : {"terrain", "city", "hairball", "soup"}) {
+        hold_contest(kind, options);
+    }
+}
+
+}  // namespace
+}  // namespace packet::bench
+
+int main(int argc, char** argv) {
+    packet::bench::Options options;
+    CLI::App app("Builds generated scenes with our builders and Embree's, on all threads",
+                 "packet_builds");
+    app.add_option("--triangles", options.triangles, "of each scene")
+        ->check(CLI::Range(std::size_t{1}, packet::tools::kMaxTriangles))
+        ->capture_default_str();
+    app.add_option("--repeat", options.repeats, "timed builds of each")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    return packet::bench::run_program(app, argc, argv, [&] {
+        packet::bench::run(options);
+        return 0;
+    });
+}

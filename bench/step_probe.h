@@ -1,0 +1,158 @@
+// The steps of walks, box and triangle tests, each in a loop of its own for one instruction set.
+// Compiled per instruction set, as the kernels are.
+#pragma once
+
+#include "kernels/leaf.h"
+#include "kernels/packet_walk.h"
+#include "kernels/single_walk.h"
+
+#include <cstddef>
+#include <cstdint>
+
+namespace packet::bench {
+
+/// Each of the rays meets each of the boxes or triangles. Boxes come in both forms, eight to a wide
+/// node.
+struct StepInput {
+    TreeView tree;  ///< has nodes, wide nodes, blocks, and the box of all
+    std::size_t node_count, wide_node_count, block_count;
+    const Ray* rays;
+    std::size_t ray_count;  ///< a multiple of 16; each 16 share their directions' octant and axis
+};
+
+/// Returns how many of all pairs of a ray and an item meet.
+using StepProbe = std::uint64_t (*)(const StepInput&);
+
+struct StepName {
+    const char* name;  ///< test / rays x items at once
+    StepProbe probe;
+};
+/// In the order of their names, the same for all instruction sets.
+struct StepProbes {
+    static constexpr int kCount = 11;
+    StepName steps[kCount];
+};
+
+StepProbes step_probes_scalar();
+StepProbes step_probes_sse42();
+StepProbes step_probes_avx2();
+StepProbes step_probes_avx512();
+
+template <int N, class Isa>
+PACKET_INLINE RayLanes<N, Isa> load_rays(const Ray* rays) {
+    float lanes[8][N];
+    for (int i = 0; i < N; ++i) {
+        const Ray& ray = rays[i];
+        lanes[0][i] = ray.org.x, lanes[1][i] = ray.org.y, lanes[2][i] = ray.org.z;
+        lanes[3][i] = ray.dir.x, lanes[4][i] = ray.dir.y, lanes[5][i] = ray.dir.z;
+        lanes[6][i] = ray.tnear, lanes[7][i] = ray.tfar;
+    }
+    using F = Float<N, Isa>;
+    return {{F::load(lanes[0]), F::load(lanes[1]), F::load(lanes[2])},
+            {F::load(lanes[3]), F::load(lanes[4]), F::load(lanes[5])},
+            F::load(lanes[6]),
+            F::load(lanes[7])};
+}
+
+/// Calls step(prepared rays, best_t) for every N rays.
+template <int N, class Isa, class Step>
+PACKET_INLINE void for_each_packet(const StepInput& in, Step&& step) {
+    for (std::size_t i = 0; i < in.ray_count; i += N) {
+        const RayLanes<N, Isa> lanes = load_rays<N, Isa>(in.rays + i);
+        PreparedRays<N, Isa> rays;
+        prepare(rays, in.tree, lanes, (1u << N) - 1);
+        step(rays, Float<N, Isa>(kLargestFloat));
+    }
+}
+
+template <Directions directions, int N, class Isa>
+std::uint64_t packets_meet_boxes(const StepInput& in) {
+    std::uint64_t met = 0;
+    for_each_packet<N, Isa>(in, [&](const PreparedRays<N, Isa>& rays, Float<N, Isa> best_t) {
+        for (std::size_t i = 0; i < in.node_count; ++i) {
+            const Interval<N, Isa> box = slabs<directions>(rays, in.tree.nodes[i]);
+            met += static_cast<std::uint64_t>(count(meets(rays, box, best_t)));
+        }
+    });
+    return met;
+}
+
+template <Directions directions, int N, class Isa>
+std::uint64_t packets_meet_triangles(const StepInput& in) {
+    std::uint64_t met = 0;
+    for_each_packet<N, Isa>(in, [&](const PreparedRays<N, Isa>& rays, Float<N, Isa> best_t) {
+        for (std::size_t i = 0; i < in.block_count * kBlockSize; ++i) {
+            const SameTriangle triangle{in.tree.blocks[i / kBlockSize],
+                                        static_cast<int>(i % kBlockSize)};
+            const Mask<N, Isa> candidates = may_hit<directions>(rays.shear, triangle);
+            if (none(candidates)) continue;
+            met += static_cast<std::uint64_t>(
+                count(decide_hits<directions>(rays, best_t, candidates, triangle).hit));
+        }
+    });
+    return met;
+}
+
+/// Calls step(ray) for every ray.
+template <class Isa, class Step>
+PACKET_INLINE void for_each_single(const StepInput& in, Step&& step) {
+    for (std::size_t i = 0; i < in.ray_count; i += kSingleLanes) {
+        PreparedLanes lanes;
+        prepare_lanes(in.tree, load_rays<kSingleLanes, Isa>(in.rays + i), lanes);
+        for (int lane = 0; lane < kSingleLanes; ++lane) step(SingleRay(lanes, lane));
+    }
+}
+
+template <class Isa>
+std::uint64_t ray_meets_wide_boxes(const StepInput& in) {
+    using F = Float<kWideSize, Isa>;
+    std::uint64_t met = 0;
+    for_each_single<Isa>(in, [&](const SingleRay& ray) {
+        const WideRay<Isa> wide(ray);
+        for (std::size_t i = 0; i < in.wide_node_count; ++i) {
+            const Interval<kWideSize, Isa> boxes = wide.slabs(in.tree.wide_nodes[i]);
+            met += static_cast<std::uint64_t>(
+                count(max(boxes.enter, wide.tnear) <= min(boxes.exit, F(kLargestFloat))));
+        }
+    });
+    return met;
+}
+
+template <class Isa>
+std::uint64_t ray_meets_blocks(const StepInput& in) {
+    constexpr Directions kShared = Directions::kShared;  // one ray in all lanes
+    std::uint64_t met = 0;
+    for_each_single<Isa>(in, [&](const SingleRay& ray) {
+        ShearRays<kBlockSize, Isa> shear;
+        ray.broadcast(shear);
+        for (std::size_t i = 0; i < in.block_count; ++i) {
+            const BlockTriangles triangles{in.tree.blocks[i]};
+            const Mask<kBlockSize, Isa> candidates = may_hit<kShared>(shear, triangles);
+            if (none(candidates)) continue;
+            PreparedRays<kBlockSize, Isa> rays;
+            ray.broadcast(rays);
+            const Float<kBlockSize, Isa> best_t(kLargestFloat);
+            met += static_cast<std::uint64_t>(
+                count(decide_hits<kShared>(rays, best_t, candidates, triangles).hit));
+        }
+    });
+    return met;
+}
+
+template <class Isa>
+StepProbes make_step_probes() {
+    constexpr Directions kShared = Directions::kShared, kMixed = Directions::kMixed;
+    return {{{"box/1x1", packets_meet_boxes<kShared, 1, Isa>},
+             {"box/1x8", ray_meets_wide_boxes<Isa>},
+             {"box/8x1", packets_meet_boxes<kShared, 8, Isa>},
+             {"box/8x1mixed", packets_meet_boxes<kMixed, 8, Isa>},
+             {"box/16x1", packets_meet_boxes<kShared, 16, Isa>},
+             {"box/16x1mixed", packets_meet_boxes<kMixed, 16, Isa>},
+             {"triangle/1x1", packets_meet_triangles<kShared, 1, Isa>},
+             {"triangle/1x8", ray_meets_blocks<Isa>},
+             {"triangle/8x1", packets_meet_triangles<kShared, 8, Isa>},
+             {"triangle/16x1", packets_meet_triangles<kShared, 16, Isa>},
+             {"triangle/16x1mixed", packets_meet_triangles<kMixed, 16, Isa>}}};
+}
+
+}  // namespace packet::bench
