@@ -84,10 +84,9 @@ std::uint64_t packets_meet_triangles(const StepInput& in) {
         for (std::size_t i = 0; i < in.block_count * kBlockSize; ++i) {
             const SameTriangle triangle{in.tree.blocks[i / kBlockSize],
                                         static_cast<int>(i % kBlockSize)};
-            const Mask<N, Isa> candidates = may_hit<directions>(rays.shear, triangle);
-            if (none(candidates)) continue;
+            const Mask<N, Isa> all = best_t > Float<N, Isa>(kNever);
             met += static_cast<std::uint64_t>(
-                count(decide_hits<directions>(rays, best_t, candidates, triangle).hit));
+                count(meet_triangle<directions>(rays, best_t, all, triangle).hit));
         }
     });
     return met;
@@ -127,13 +126,14 @@ std::uint64_t ray_meets_blocks(const StepInput& in) {
         ray.broadcast(shear);
         for (std::size_t i = 0; i < in.block_count; ++i) {
             const BlockTriangles triangles{in.tree.blocks[i]};
-            const Mask<kBlockSize, Isa> candidates = may_hit<kShared>(shear, triangles);
+            const auto sheared = packet::shear<kShared>(shear, triangles);
+            const Mask<kBlockSize, Isa> candidates = sheared.may_hit();
             if (none(candidates)) continue;
-            PreparedRays<kBlockSize, Isa> rays;
+            HitRays<kBlockSize, Isa> rays;
             ray.broadcast(rays);
             const Float<kBlockSize, Isa> best_t(kLargestFloat);
             met += static_cast<std::uint64_t>(
-                count(decide_hits<kShared>(rays, best_t, candidates, triangles).hit));
+                count(decide_hits(sheared, rays, best_t, candidates, triangles).hit));
         }
     });
     return met;

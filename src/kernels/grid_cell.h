@@ -93,31 +93,37 @@ template <Query query, Directions directions, int N, class Isa, class Stats>
     }
 }
 
+template <Query query, Directions directions, int N, class Isa, class Stats>
+PACKET_INLINE void meet_cell_directed(const TreeView& tree, const GridCell& cell,
+                                      const PreparedRays<N, Isa>& ray, Mask<N, Isa> active,
+                                      std::int32_t instance_id, Mailbox<Isa>& mailbox,
+                                      BestHits<N, Isa>& best, Stats& stats) {
+    if (cell.count != 0) {
+        meet_items<query, directions>(tree, ray, cell.first, cell.count, count(active), instance_id,
+                                      mailbox, best, stats);
+        return;
+    }
+    const TreeView subtree = tree_of_cell(tree, cell);
+    walk_tree<directions>(subtree, ray, best.t, stats,
+                          [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> in_leaf) {
+                              meet_items<query, directions>(subtree, ray, first, item_count,
+                                                            count(in_leaf), instance_id, mailbox,
+                                                            best, stats);
+                          });
+}
+
 template <Query query, int N, class Isa, class Stats>
 PACKET_INLINE void meet_cell(const TreeView& tree, const GridCell& cell,
                              const PreparedRays<N, Isa>& ray, Mask<N, Isa> active,
                              std::int32_t instance_id, Mailbox<Isa>& mailbox,
                              BestHits<N, Isa>& best, Stats& stats) {
-    const auto meet = [&](const TreeView& in, std::uint32_t first, std::uint32_t item_count,
-                          int lane_count) {
-        if (ray.directions == Directions::kShared) {
-            meet_items<query, Directions::kShared>(in, ray, first, item_count, lane_count,
-                                                   instance_id, mailbox, best, stats);
-        } else {
-            meet_items<query, Directions::kMixed>(in, ray, first, item_count, lane_count,
-                                                  instance_id, mailbox, best, stats);
-        }
-    };
-    if (cell.count != 0) {
-        meet(tree, cell.first, cell.count, count(active));
-        return;
+    if (ray.directions == Directions::kShared) {
+        meet_cell_directed<query, Directions::kShared>(tree, cell, ray, active, instance_id,
+                                                       mailbox, best, stats);
+    } else {
+        meet_cell_directed<query, Directions::kMixed>(tree, cell, ray, active, instance_id, mailbox,
+                                                      best, stats);
     }
-    const TreeView subtree = tree_of_cell(tree, cell);
-    walk_tree<Directions::kMixed>(
-        subtree, ray, best.t, stats,
-        [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> in_leaf) {
-            meet(subtree, first, item_count, count(in_leaf));
-        });
 }
 
 }  // namespace packet

@@ -151,9 +151,9 @@ PACKET_INLINE void gather_8_rays(const TraceBatch& batch, std::size_t begin,
                                  RayArrays<kCount, Isa>& out, int first) {
     static_assert(sizeof(Ray) == 8 * sizeof(float));
     Floats8 rows[8];
-    for (std::size_t i = 0; i < 8; ++i) rows[i] = load8(batch.rays + place(batch, begin + i));
+    for (std::size_t i = 0; i < 8; ++i) rows[i] = *as_row(batch.rays + place(batch, begin + i));
     transpose(rows);
-    for (int i = 0; i < 8; ++i) store8(out.component[i] + first, rows[i]);
+    for (int i = 0; i < 8; ++i) *as_row(out.component[i] + first) = rows[i];
 }
 
 template <int kCount, class Isa>
@@ -191,16 +191,15 @@ PACKET_INLINE void scatter_8_hits(const TraceBatch& batch, std::size_t begin,
     static_assert(sizeof(Hit) == 6 * sizeof(float));
     std::uint32_t mesh_id[8];
     for (int i = 0; i < 8; ++i) mesh_id[i] = mesh_of(*batch.scene, hits.instance_id[first + i]);
-    const Floats8 ids = load8(hits.prim_id + first), meshes = load8(mesh_id),
-                  instances = load8(hits.instance_id + first);
-    Floats8 rows[8] = {load8(hits.t + first),
-                       load8(hits.u + first),
-                       load8(hits.v + first),
-                       ids,
-                       meshes,
+    const Floats8 instances = *as_row(hits.instance_id + first);
+    Floats8 rows[8] = {*as_row(hits.t + first),
+                       *as_row(hits.u + first),
+                       *as_row(hits.v + first),
+                       *as_row(hits.prim_id + first),
+                       *as_row(mesh_id),
                        instances,
                        instances,
-                       instances};
+                       instances};  // the last two are not stored
     transpose(rows);
     for (std::size_t i = 0; i < 8; ++i) store6(&batch.hits[place(batch, begin + i)], rows[i]);
 }

@@ -10,11 +10,13 @@ namespace packet {
 using Floats8 [[gnu::vector_size(32)]] = float;
 using UnalignedFloats8 [[gnu::vector_size(32), gnu::aligned(4), gnu::may_alias]] = float;
 
-PACKET_INLINE Floats8 load8(const void* from) {
-    return *static_cast<const UnalignedFloats8*>(from);
+/// Numbers in memory as a row. (Passed by address: as values rows would be passed differently with
+/// and without AVX.)
+PACKET_INLINE const UnalignedFloats8* as_row(const void* numbers) {
+    return static_cast<const UnalignedFloats8*>(numbers);
 }
-PACKET_INLINE void store8(void* to, const Floats8& row) {
-    *static_cast<UnalignedFloats8*>(to) = row;
+PACKET_INLINE UnalignedFloats8* as_row(void* numbers) {
+    return static_cast<UnalignedFloats8*>(numbers);
 }
 /// Stores the first six.
 PACKET_INLINE void store6(void* to, const Floats8& row) {
