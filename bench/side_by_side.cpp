@@ -37,6 +37,7 @@ struct Options {
     std::vector<std::filesystem::path> scenes;
     std::vector<int> threads{1};
     std::vector<std::string> rays = all_ray_kinds();
+    BuildOptions build;
     tools::CameraOptions camera;
     int repeats = 5;
     bool robust = false;
@@ -52,12 +53,12 @@ double seconds_since(Clock::time_point begin) {
 /// One scene as both sides hold it. Embree's trees are of the qualities it is fastest with.
 class Arena {
 public:
-    Arena(const std::filesystem::path& path, EmbreeTest test)
+    Arena(const std::filesystem::path& path, const BuildOptions& build, EmbreeTest test)
         : scene_(make_scene(load_gltf(path).scene.flatten())) {
         report_.scene = path.filename().string();
         report_.triangle_count = mesh().triangles.size();
         const auto begin = Clock::now();
-        scene_.commit();
+        scene_.commit(build);
         report_.builds.push_back({"ours", seconds_since(begin)});
         for (const ModeName& mode : mode_names()) {
             contenders_.push_back(our_contender(scene_, mode));
@@ -98,7 +99,7 @@ bool run(const Options& options) {
     nlohmann::json all = nlohmann::json::array();
     bool acceptable = true;
     for (const std::filesystem::path& path : options.scenes) {
-        Arena arena(path, test);
+        Arena arena(path, options.build, test);
         if (!options.json) print_head(arena.report(), arena.contenders());
         for (const int threads : options.threads) {
             for (const std::string& name : options.rays) {
@@ -125,6 +126,10 @@ void add_options(CLI::App& app, Options& options) {
         ->delimiter(',')
         ->check(CLI::IsMember(all_ray_kinds()))
         ->capture_default_str();
+    tools::add_name_option(
+        app, "--quality", "of our tree", tools::list_names(quality_names()),
+        [&](std::string_view name) { options.build.quality = parse_quality(name); })
+        ->default_str("balanced");
     app.add_option("--repeat", options.repeats, "timed runs of each contender")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();

@@ -201,10 +201,34 @@ TEST_CASE("triangles in the planes of slices, in one plane, and in one place") {
     }
 }
 
-TEST_CASE("budgets that are none are errors that name them") {
+TEST_CASE("budgets and qualities that are none are errors that name them") {
     const TriangleMesh mesh = tools::make_soup(10, 1);
     for (const float budget : {-0.1f, 8.1f, std::nanf("")}) {
         CHECK_THROWS_WITH_AS((void)build_tree(mesh.view(), spatial_options(budget)),
                              "BuildOptions::spatial_budget must be 0 to 8", Error);
     }
+    BuildOptions options = spatial_options(0.5f);
+    options.quality = BuildQuality::kHigh;
+    CHECK_THROWS_WITH_AS((void)build_tree(mesh.view(), options),
+                         "quality 'high' chooses how bvh is built; there is none of bvh-spatial",
+                         Error);
+    CHECK_THROWS_WITH_AS((void)parse_quality("best"),
+                         "unknown quality 'best'; valid are: fast, balanced, high", Error);
+}
+
+TEST_CASE("a quality builds the tree of the structure that serves it") {
+    const TriangleMesh mesh = tools::make_city(5000, 1);
+    for (const QualityName& entry : quality_names()) {
+        CAPTURE(entry.name);
+        BuildOptions by_quality, by_name;
+        by_quality.quality = parse_quality(entry.name);
+        by_name.accel = chosen_accel(by_quality);
+        CHECK(to_string(entry.quality) == entry.name);
+        CHECK(are_same(build_tree(mesh.view(), by_quality), build_tree(mesh.view(), by_name)));
+    }
+    BuildOptions options;
+    options.quality = BuildQuality::kFast;
+    CHECK(chosen_accel(options) == AccelKind::kBvhMorton);
+    options.quality = BuildQuality::kHigh;
+    CHECK(chosen_accel(options) == AccelKind::kBvhSpatial);
 }

@@ -25,8 +25,18 @@ enum class AccelKind : std::uint8_t {
     kGridOfTrees   ///< coarse grid whose crowded cells hold hierarchies of their own
 };
 
+/// How much time the build of a bounding volume hierarchy may take for faster tracing.
+enum class BuildQuality : std::uint8_t {
+    kFast,      ///< that of kBvhMorton
+    kBalanced,  ///< that of kBvh
+    kHigh       ///< that of kBvhSpatial
+};
+
 struct BuildOptions {
     AccelKind accel = AccelKind::kBvh;
+    /// Which builder serves `kBvh`. Every other structure names its own: with one of them, anything
+    /// but kBalanced is an Error{kUnsupported}.
+    BuildQuality quality = BuildQuality::kBalanced;
     /// Largest leaf, in triangles, 1 to 64. Larger leaves build faster and trace slower.
     int max_leaf_size = 8;
     /// Cost of visiting a node, in triangle tests. Raise it for flatter trees with larger leaves.
@@ -73,6 +83,20 @@ struct BuildStats {
     double sah_cost = 0.0;  ///< expected cost of a random ray that meets the root's box
     SkippedTriangles skipped;
 };
+
+/// The structure that the options come to: `accel`, or the one that serves `kBvh` by `quality`.
+/// Throws Error{kUnsupported} for a quality with a structure that has none.
+[[nodiscard]] AccelKind chosen_accel(const BuildOptions& options);
+
+/// A quality's name on the command line.
+struct QualityName {
+    BuildQuality quality;
+    std::string_view name;
+};
+[[nodiscard]] std::span<const QualityName> quality_names() noexcept;
+[[nodiscard]] std::string_view to_string(BuildQuality quality) noexcept;
+/// Throws Error{kUnknownName} that lists the valid names.
+[[nodiscard]] BuildQuality parse_quality(std::string_view name);
 
 /// A structure's name on the command line and in files.
 struct AccelName {

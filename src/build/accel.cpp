@@ -13,9 +13,11 @@
 #include "core/names.h"
 
 #include <packet/accel.h>
+#include <packet/error.h>
 
 #include <array>
 #include <chrono>
+#include <string>
 
 namespace packet {
 
@@ -43,6 +45,35 @@ std::string_view to_string(AccelKind kind) noexcept {
 
 AccelKind parse_accel(std::string_view name) {
     return find_by_name(kAccelNames, name, "structure").kind;
+}
+
+static constexpr std::array kQualityNames = {
+    QualityName{BuildQuality::kFast, "fast"},
+    QualityName{BuildQuality::kBalanced, "balanced"},
+    QualityName{BuildQuality::kHigh, "high"},
+};
+
+std::span<const QualityName> quality_names() noexcept { return kQualityNames; }
+
+std::string_view to_string(BuildQuality quality) noexcept {
+    for (const QualityName& entry : kQualityNames) {
+        if (entry.quality == quality) return entry.name;
+    }
+    return "?";
+}
+
+BuildQuality parse_quality(std::string_view name) {
+    return find_by_name(kQualityNames, name, "quality").quality;
+}
+
+AccelKind chosen_accel(const BuildOptions& options) {
+    if (options.quality == BuildQuality::kBalanced) return options.accel;
+    if (options.accel != AccelKind::kBvh) {
+        throw Error(ErrorCode::kUnsupported, "quality '" + std::string(to_string(options.quality)) +
+                                                 "' chooses how bvh is built; there is none of " +
+                                                 std::string(to_string(options.accel)));
+    }
+    return options.quality == BuildQuality::kFast ? AccelKind::kBvhMorton : AccelKind::kBvhSpatial;
 }
 
 /// `tree(hierarchy)` makes a tree of what most builders hand on.
@@ -86,7 +117,7 @@ Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress, 
     const auto start = std::chrono::steady_clock::now();
     validate(mesh);
     validate(options);
-    const AccelKind kind = options.accel;
+    const AccelKind kind = chosen_accel(options);
     const Parallel parallel(options.threads, progress);
     progress.start_phase(kShareOfReferences * share);
     References references;
