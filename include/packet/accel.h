@@ -16,7 +16,7 @@ enum class AccelKind : std::uint8_t {
     kBvh,          ///< bounding volume hierarchy by the binned surface area heuristic
     kBvhMidpoint,  ///< the same, split at the middle of the centroids
     kBvhMorton,    ///< the same, by the Morton codes of the centroids: the fastest to build
-    kBvhSpatial,   ///< as kBvh, but cutting triangles where nodes would overlap: the best to trace
+    kBvhSpatial,   ///< as kBvh, but cutting triangles where nodes would overlap
     kKdMidpoint,   ///< k-d tree, cells cut in the middle, axes in turn
     kKdMedian,     ///< k-d tree, cells cut at the median of what they hold, axes in turn
     kKdSah,        ///< k-d tree, cells cut by the surface area heuristic
