@@ -35,6 +35,7 @@ struct Options {
     std::vector<std::filesystem::path> scenes;
     std::vector<int> threads{1};
     std::vector<std::string> rays = all_ray_kinds();
+    BuildOptions build;
     tools::CameraOptions camera;
     int repeats = 5;
     bool robust = false;
@@ -44,11 +45,11 @@ struct Options {
 /// One scene as both sides hold it. Embree's trees are of the qualities it is fastest with.
 class Arena {
 public:
-    Arena(const std::filesystem::path& path, EmbreeTest test)
+    Arena(const std::filesystem::path& path, const BuildOptions& build, EmbreeTest test)
         : scene_(make_scene(load_gltf(path).scene.flatten())) {
         report_.scene = path.filename().string();
         report_.triangle_count = mesh().triangles.size();
-        report_.builds.push_back({"ours", tools::seconds_of([&] { scene_.commit(); })});
+        report_.builds.push_back({"ours", tools::seconds_of([&] { scene_.commit(build); })});
         for (const ModeName& mode : mode_names()) {
             contenders_.push_back(our_contender(scene_, mode));
         }
@@ -87,7 +88,7 @@ bool run(const Options& options) {
     nlohmann::json all = nlohmann::json::array();
     bool acceptable = true;
     for (const std::filesystem::path& path : options.scenes) {
-        Arena arena(path, test);
+        Arena arena(path, options.build, test);
         if (!options.json) print_head(arena.report(), arena.contenders());
         for (const int threads : options.threads) {
             for (const std::string& name : options.rays) {
@@ -114,6 +115,10 @@ void add_options(CLI::App& app, Options& options) {
         ->delimiter(',')
         ->check(CLI::IsMember(all_ray_kinds()))
         ->capture_default_str();
+    tools::add_name_option(
+        app, "--quality", "of our tree", tools::list_names(quality_names()),
+        [&](std::string_view name) { options.build.quality = parse_quality(name); })
+        ->default_str("balanced");
     app.add_option("--repeat", options.repeats, "timed runs of each contender")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();

@@ -142,8 +142,24 @@ TEST_CASE("unknown names list the valid ones") {
     check_failure(program.run(trace + "--accel fast"), 2, "bvh");
     check_failure(program.run(trace + "--mode fast"), 2, "packet8");
     check_failure(program.run(trace + "--isa mmx"), 2, "sse42");
-    check_failure(program.run(trace + "--quality best"), 2, "balanced");
+    check_failure(program.run(trace + "--quality best"), 2, "valid are: fast, balanced, high");
     check_failure(program.run(trace, "PACKET_ISA=mmx"), 2, "sse42");
+}
+
+TEST_CASE("a quality chooses the builder of the bvh, and of nothing else") {
+    const ProgramWithScene program;
+    const std::string trace = "trace scene.glb rays.npy --json ";
+    const auto accel = [&](const std::string& options) {
+        return json::parse(program.output(trace + options))["accel"];
+    };
+    CHECK(accel("--quality fast") == "bvh-morton");
+    CHECK(accel("--quality balanced") == "bvh");
+    CHECK(accel("--accel bvh --quality high") == "bvh-spatial");
+    CHECK(accel("--quality balanced --accel octree") == "octree");
+    const char* const message = "quality 'high' chooses how bvh is built; there is none of octree";
+    check_failure(program.run(trace + "--quality high --accel octree"), 2, message);
+    check_failure(program.run("render none.glb -o x.png --accel octree --quality high"), 2,
+                  message);
 }
 
 TEST_CASE("bad command lines exit with 2") {

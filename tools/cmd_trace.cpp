@@ -84,7 +84,7 @@ TraceReport describe(const Scene& scene, const TraceCommand& command) {
     TraceReport report;
     report.triangles = scene.triangle_count();
     report.instances = scene.instances().size();
-    report.accel = common.build.accel;
+    report.accel = chosen_accel(common.build);
     report.mode = common.trace.mode;
     report.isa = common.trace.isa ? *common.trace.isa : default_isa();
     const int all = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));

@@ -99,11 +99,12 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
     add_name_option(app, "--accel", "Acceleration structure", list_names(accel_names()),
                     [&](std::string_view name) { options.build.accel = parse_accel(name); })
         ->default_str("bvh");
-    add_name_option(app, "--quality", "Of the bvh", list_names(kQualities),
-                    [&](std::string_view name) {
-                        options.quality = find_name("quality", name, kQualities).value;
-                    })
+    add_name_option(app, "--quality", "Of the bvh, which chooses its builder",
+                    list_names(quality_names()),
+                    [&](std::string_view name) { options.build.quality = parse_quality(name); })
         ->default_str("balanced");
+    // Before any work is done, and whichever of the two came first.
+    app.parse_complete_callback([&] { (void)chosen_accel(options.build); });
     add_name_option(app, "--mode", "How rays are grouped", list_names(mode_names()),
                     [&](std::string_view name) { options.trace.mode = parse_mode(name); })
         ->default_str("auto");

@@ -9,21 +9,14 @@
 
 #include <CLI/CLI.hpp>
 
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
 
 namespace packet::tools {
 
-/// How much time a build may take for faster tracing.
-enum class Quality : std::uint8_t { kBalanced };
-
-inline constexpr Named<Quality> kQualities[] = {{Quality::kBalanced, "balanced"}};
-
 struct CommonOptions {
     BuildOptions build;
-    Quality quality = Quality::kBalanced;
     TraceOptions trace;
 };
 

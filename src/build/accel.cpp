@@ -2,6 +2,7 @@
 #include "build/bvh_midpoint.h"
 #include "build/bvh_morton.h"
 #include "build/bvh_sah.h"
+#include "build/bvh_spatial.h"
 #include "build/grid_of_trees.h"
 #include "build/kd_tree.h"
 #include "build/octree.h"
@@ -12,9 +13,11 @@
 #include "core/names.h"
 
 #include <packet/accel.h>
+#include <packet/error.h>
 
 #include <array>
 #include <chrono>
+#include <string>
 
 namespace packet {
 
@@ -22,6 +25,7 @@ static constexpr std::array kAccelNames = {
     AccelName{AccelKind::kBvh, "bvh"},
     AccelName{AccelKind::kBvhMidpoint, "bvh-midpoint"},
     AccelName{AccelKind::kBvhMorton, "bvh-morton"},
+    AccelName{AccelKind::kBvhSpatial, "bvh-spatial"},
     AccelName{AccelKind::kKdMidpoint, "kd-midpoint"},
     AccelName{AccelKind::kKdMedian, "kd-median"},
     AccelName{AccelKind::kKdSah, "kd-sah"},
@@ -43,14 +47,43 @@ AccelKind parse_accel(std::string_view name) {
     return find_by_name(kAccelNames, name, "structure").kind;
 }
 
+static constexpr std::array kQualityNames = {
+    QualityName{BuildQuality::kFast, "fast"},
+    QualityName{BuildQuality::kBalanced, "balanced"},
+    QualityName{BuildQuality::kHigh, "high"},
+};
+
+std::span<const QualityName> quality_names() noexcept { return kQualityNames; }
+
+std::string_view to_string(BuildQuality quality) noexcept {
+    for (const QualityName& entry : kQualityNames) {
+        if (entry.quality == quality) return entry.name;
+    }
+    return "?";
+}
+
+BuildQuality parse_quality(std::string_view name) {
+    return find_by_name(kQualityNames, name, "quality").quality;
+}
+
+AccelKind chosen_accel(const BuildOptions& options) {
+    if (options.quality == BuildQuality::kBalanced) return options.accel;
+    if (options.accel != AccelKind::kBvh) {
+        throw Error(ErrorCode::kUnsupported, "quality '" + std::string(to_string(options.quality)) +
+                                                 "' chooses how bvh is built; there is none of " +
+                                                 std::string(to_string(options.accel)));
+    }
+    return options.quality == BuildQuality::kFast ? AccelKind::kBvhMorton : AccelKind::kBvhSpatial;
+}
+
 /// `tree(hierarchy)` makes a tree of what most builders hand on.
 template <class MakeTree>
-static Tree build(MeshView mesh, AlignedVector<Reference> references, const BuildOptions& options,
-                  const Parallel& parallel, const MakeTree& tree) {
+static Tree build(AccelKind kind, MeshView mesh, AlignedVector<Reference> references,
+                  const BuildOptions& options, const Parallel& parallel, const MakeTree& tree) {
     const auto kd_tree = [&](KdRule rule) {
         return tree(build_kd_tree(rule, mesh, std::move(references), options, parallel));
     };
-    switch (options.accel) {
+    switch (kind) {
         case AccelKind::kBvh: return tree(build_bvh_sah(std::move(references), options, parallel));
         case AccelKind::kKdMidpoint: return kd_tree(KdRule::kMidpoint);
         case AccelKind::kKdMedian: return kd_tree(KdRule::kMedian);
@@ -61,6 +94,8 @@ static Tree build(MeshView mesh, AlignedVector<Reference> references, const Buil
             return tree(build_bvh_midpoint(std::move(references), options, parallel));
         case AccelKind::kBvhMorton:
             return tree(build_bvh_morton(std::move(references), options, parallel));
+        case AccelKind::kBvhSpatial:
+            return tree(build_bvh_spatial(mesh, std::move(references), options, parallel));
         case AccelKind::kGrid: return build_uniform_grid(mesh, references, options, parallel);
         case AccelKind::kGridOfTrees:
             return build_grid_of_trees(mesh, references, options, parallel);
@@ -82,6 +117,7 @@ Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress, 
     const auto start = std::chrono::steady_clock::now();
     validate(mesh);
     validate(options);
+    const AccelKind kind = chosen_accel(options);
     const Parallel parallel(options.threads, progress);
     progress.start_phase(kShareOfReferences * share);
     References references;
@@ -92,11 +128,11 @@ Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress, 
         progress.start_phase((1.0 - kShareOfReferences - kShareOfHierarchy) * share);
         return make_tree(hierarchy, mesh, options, parallel);
     };
-    Tree tree = build(mesh, std::move(references.items), options, parallel, finish);
+    Tree tree = build(kind, mesh, std::move(references.items), options, parallel, finish);
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();
-    PACKET_ASSERT((validate(tree, mesh, options.accel), true));  // throws, and says what is wrong
+    PACKET_ASSERT((validate(tree, mesh, kind), true));  // throws, and says what is wrong
     return tree;
 }
 

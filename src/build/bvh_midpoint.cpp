@@ -52,15 +52,17 @@ public:
     MidpointSplit(const BuildOptions& options, const Parallel& parallel)
         : max_leaf_size_(static_cast<std::size_t>(options.max_leaf_size)), parallel_(parallel) {}
 
-    std::size_t operator()(ReferenceSpan refs, const NodeBounds& bounds, int depth) const {
-        if (refs.size() <= max_leaf_size_) return 0;
-        const glm::vec3 middle = bounds.centroids.center();
+    std::optional<Halves> operator()(const NodeRange& node, int depth) const {
+        const ReferenceSpan refs = node.refs;
+        if (refs.size() <= max_leaf_size_) return {};
+        const glm::vec3 middle = node.bounds.centroids.center();
         const int axis = axis_of_greatest_variance(refs, middle, parallel_);
         const auto second = std::partition(refs.begin(), refs.end(), [&](const Reference& r) {
             return centroid2(r)[axis] < middle[axis];
         });
-        const auto first = static_cast<std::size_t>(second - refs.begin());
-        return is_allowed(first, refs.size(), depth) ? first : halve(refs, bounds.centroids);
+        auto first = static_cast<std::size_t>(second - refs.begin());
+        if (!is_allowed(first, refs.size(), depth)) first = halve(refs, node.bounds.centroids);
+        return divide(node, first, parallel_);
     }
 
 private:
@@ -72,7 +74,7 @@ private:
 
 Hierarchy build_bvh_midpoint(AlignedVector<Reference> references, const BuildOptions& options,
                              const Parallel& parallel) {
-    return TopDownBuilder(std::move(references), parallel, MidpointSplit(options, parallel))
+    return TopDownBuilder(std::move(references), 0, parallel, MidpointSplit(options, parallel))
         .build();
 }
 

@@ -1,5 +1,7 @@
 #include "build/split.h"
 
+#include "build/lane_bounds.h"
+
 #include <algorithm>
 
 namespace packet {
@@ -8,7 +10,9 @@ NodeBounds measure(ReferenceSpan refs, const Parallel& parallel) {
     return fold_references<NodeBounds>(
         refs, parallel,
         [](NodeBounds& out, ReferenceSpan piece) {
-            for (const Reference& r : piece) out.extend(r);
+            LaneBounds bounds;
+            for (const Reference& r : piece) bounds.extend(r);
+            out = bounds.node_bounds();
         },
         [](NodeBounds& a, const NodeBounds& b) { a.extend(b); });
 }
@@ -26,6 +30,23 @@ std::size_t halve(ReferenceSpan refs, const Bounds3f& centroids) {
                          return ca < cb || (ca == cb && a.id < b.id);
                      });
     return half;
+}
+
+Halves divide(const NodeRange& node, std::size_t first, const NodeBounds& bounds0,
+              const NodeBounds& bounds1) {
+    const std::size_t count = node.refs.size(), second = count - first;
+    const std::size_t room0 = node.room * first / count;
+    // The first's room lies between them: as many of the second's move behind the others.
+    const std::size_t moved = std::min(room0, second);
+    Reference* const begin = node.refs.data() + first;
+    std::copy_n(begin, moved, begin + room0 + second - moved);
+    return {{{node.refs.first(first), bounds0, room0},
+             {{begin + room0, second}, bounds1, node.room - room0}}};
+}
+
+Halves divide(const NodeRange& node, std::size_t first, const Parallel& parallel) {
+    return divide(node, first, measure(node.refs.first(first), parallel),
+                  measure(node.refs.subspan(first), parallel));
 }
 
 }  // namespace packet

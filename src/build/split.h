@@ -1,13 +1,16 @@
 // What builders that sort references from the top down have in common: each splits a node's
-// references in two, and those again; they differ only in where.
+// references in two, and those again; they differ only in where, and in whether they cut triangles.
 #pragma once
 
 #include "build/hierarchy.h"
 #include "core/views.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -23,15 +26,21 @@ struct NodeBounds {
     Bounds3f box;
     Bounds3f centroids;  ///< doubled, as by centroid2
 
-    void extend(const Reference& r) noexcept {
-        box.extend(r.bounds());
-        centroids.extend(centroid2(r));
-    }
     void extend(const NodeBounds& other) noexcept {
         box.extend(other.box);
         centroids.extend(other.centroids);
     }
 };
+
+/// The references of a node while it is built.
+struct NodeRange {
+    ReferenceSpan refs;
+    NodeBounds bounds;
+    std::size_t room = 0;  ///< how many more fit behind `refs`: parts of triangles that are cut
+
+    [[nodiscard]] std::size_t capacity() const noexcept { return refs.size() + room; }
+};
+using Halves = std::array<NodeRange, 2>;
 
 /// Folds references into a Result: fold_piece(result, piece) for pieces that several threads share
 /// if the references are many, then join(result, piece_result) in the order of the pieces.
@@ -71,64 +80,114 @@ template <class Result, class FoldPiece, class Join>
 /// Returns where the second half starts.
 [[nodiscard]] std::size_t halve(ReferenceSpan refs, const Bounds3f& centroids);
 
-/// Builds by splitting. `split(refs, bounds, depth)` sorts at least two references at `depth` to
-/// two sides and returns how many are on the first, or 0 for a leaf. It is called by several
-/// threads at once; is_allowed() must hold of what it returns.
+/// The first references and the others, with their bounds; each gets room in proportion.
+[[nodiscard]] Halves divide(const NodeRange& node, std::size_t first, const Parallel& parallel);
+[[nodiscard]] Halves divide(const NodeRange& node, std::size_t first, const NodeBounds& bounds0,
+                            const NodeBounds& bounds1);
+
+/// Builds by splitting. `split(node, depth)` sorts at least two references at `depth` to two sides,
+/// which share their memory and room, or returns none for a leaf. It is called by several threads
+/// at once; is_allowed() must hold of what it returns.
 template <class Split>
 class TopDownBuilder {
 public:
-    TopDownBuilder(AlignedVector<Reference> references, const Parallel& parallel, Split split)
-        : parallel_(parallel), split_(std::move(split)), references_(std::move(references)) {
-        // A subtree of n references has at most 2n - 1 nodes: its slots are known before its size
-        // is.
-        if (!references_.empty()) nodes_.resize(2 * references_.size() - 1);
+    /// Splitting may add up to `room` references.
+    TopDownBuilder(AlignedVector<Reference> references, std::size_t room, const Parallel& parallel,
+                   Split split)
+        : parallel_(parallel),
+          split_(std::move(split)),
+          count_(references.size()),
+          references_(std::move(references)) {
+        if (count_ == 0) return;
+        references_.resize(count_ + room);
+        nodes_.resize(2 * references_.size() - 1);  // a leaf has a reference at least
     }
 
     [[nodiscard]] Hierarchy build() && {
-        if (!references_.empty()) {
-            parallel_.run([&] { build_node(0, references_, measure(references_, parallel_), 0); });
-        }
+        if (count_ != 0) parallel_.run([&] { build_root(); });
         return {std::move(nodes_), std::move(references_)};
     }
 
 private:
-    void build_node(std::size_t slot, ReferenceSpan refs, const NodeBounds& bounds, int depth) {
-        // Below this a task costs more than the work it moves to another core.
-        constexpr std::size_t kTaskSize = 4096;
-        BuildNode& node = nodes_[slot] = {};
-        node.bounds = bounds.box;
-        const std::size_t first = refs.size() == 1 ? 0 : split_(refs, bounds, depth);
-        if (first == 0) {
-            node.first = static_cast<std::uint32_t>(refs.data() - references_.data());
-            node.count = static_cast<std::uint32_t>(refs.size());
-            return;
+    // Below this a task costs more than the work it moves to another core.
+    static constexpr std::size_t kTaskSize = 4096;
+
+    /// Where a task puts nodes, of which a pair is a node's children. It takes places from all that
+    /// there are by the hundred, so that tasks seldom meet, but never more than its references may
+    /// need: then there are enough for all.
+    class Places {
+    public:
+        Places(std::atomic<std::uint32_t>& all, std::size_t capacity)
+            : all_(all), needed_(static_cast<std::uint32_t>(2 * capacity - 2)) {}
+
+        std::uint32_t take_pair() {
+            constexpr std::uint32_t kMost = 128;
+            if (next_ == end_) {
+                const std::uint32_t count = std::min(kMost, needed_);
+                next_ = all_.fetch_add(count, std::memory_order_relaxed);
+                end_ = next_ + count;
+                needed_ -= count;
+            }
+            next_ += 2;
+            return next_ - 2;
         }
-        const std::size_t slot0 = slot + 1, slot1 = slot + 2 * first;
-        node.first = static_cast<std::uint32_t>(slot0);
-        node.second = static_cast<std::uint32_t>(slot1);
-        const auto build_child = [&](std::size_t child, ReferenceSpan items) {
-            build_node(child, items, measure(items, parallel_), depth + 1);
-            if (refs.size() > kTaskSize && items.size() <= kTaskSize) advance(items.size());
-        };
-        const auto build0 = [&] { build_child(slot0, refs.first(first)); };
-        const auto build1 = [&] { build_child(slot1, refs.subspan(first)); };
-        if (refs.size() > kTaskSize) {
-            parallel_.both(build0, build1);
-        } else {
-            build0();
-            build1();
-        }
+
+    private:
+        std::atomic<std::uint32_t>& all_;
+        std::uint32_t needed_, next_ = 0, end_ = 0;
+    };
+
+    void build_root() {
+        const ReferenceSpan refs = std::span(references_).first(count_);
+        build_task(0, {refs, measure(refs, parallel_), references_.size() - count_}, 0);
     }
 
-    void advance(std::size_t references) const {
-        parallel_.advance(static_cast<double>(references) /
+    /// Splits large nodes, each in a task of its own.
+    void build_task(std::uint32_t place, const NodeRange& node, int depth) {
+        if (node.refs.size() <= kTaskSize) {
+            Places places(used_, node.capacity());
+            build_node(place, node, depth, places);
+            advance(node);
+            return;
+        }
+        const auto halves = split_(node, depth);
+        if (!halves) return put_leaf(place, node), advance(node);
+        const std::uint32_t pair = used_.fetch_add(2, std::memory_order_relaxed);
+        put_inner(place, node, pair);
+        parallel_.both([&] { build_task(pair, (*halves)[0], depth + 1); },
+                       [&] { build_task(pair + 1, (*halves)[1], depth + 1); });
+    }
+
+    void build_node(std::uint32_t place, const NodeRange& node, int depth, Places& places) {
+        std::optional<Halves> halves;
+        if (node.refs.size() > 1) halves = split_(node, depth);
+        if (!halves) return put_leaf(place, node);
+        const std::uint32_t pair = places.take_pair();
+        put_inner(place, node, pair);
+        build_node(pair, (*halves)[0], depth + 1, places);
+        build_node(pair + 1, (*halves)[1], depth + 1, places);
+    }
+
+    void put_leaf(std::uint32_t place, const NodeRange& node) {
+        nodes_[place] = {node.bounds.box,
+                         static_cast<std::uint32_t>(node.refs.data() - references_.data()), 0,
+                         static_cast<std::uint32_t>(node.refs.size())};
+    }
+    void put_inner(std::uint32_t place, const NodeRange& node, std::uint32_t pair) {
+        nodes_[place] = {node.bounds.box, pair, pair + 1, 0};
+    }
+
+    void advance(const NodeRange& node) const {
+        parallel_.advance(static_cast<double>(node.capacity()) /
                           static_cast<double>(references_.size()));
     }
 
     const Parallel& parallel_;
     Split split_;
+    std::size_t count_;
     AlignedVector<Reference> references_;
     ScratchVector<BuildNode> nodes_;
+    std::atomic<std::uint32_t> used_ = 1;  ///< nodes; the root has the first
 };
 
 }  // namespace packet

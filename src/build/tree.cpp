@@ -170,6 +170,8 @@ void validate(const BuildOptions& options) {
           "BuildOptions::intersection_cost must be above 0, up to 1e6");
     check(options.max_reference_factor >= 1.0f && options.max_reference_factor <= 64.0f,
           "BuildOptions::max_reference_factor must be 1 to 64");
+    check(options.spatial_budget >= 0.0f && options.spatial_budget <= 8.0f,
+          "BuildOptions::spatial_budget must be 0 to 8");
     check(options.octree_levels >= 0 && options.octree_levels <= kMaxDepth / 3,
           "BuildOptions::octree_levels must be 0 to 21");
     check(options.grid_density >= 1.0f / 64.0f && options.grid_density <= 64.0f,

@@ -318,6 +318,7 @@ bool cuts_triangles(AccelKind kind) noexcept {
         case AccelKind::kBvh:
         case AccelKind::kBvhMidpoint:
         case AccelKind::kBvhMorton: return false;
+        case AccelKind::kBvhSpatial:
         case AccelKind::kKdMidpoint:
         case AccelKind::kKdMedian:
         case AccelKind::kKdSah:

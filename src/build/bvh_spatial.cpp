@@ -1,0 +1,86 @@
+// Where the best split of a node's references leaves halves that overlap, the best split of its
+// space is tried as well, and the cheaper one taken. Cutting adds references: what a node may add
+// is shared by its children in proportion to what they hold, so it does not depend on which thread
+// comes first.
+//
+// Stich, Friedrich, Dietrich. Spatial splits in bounding volume hierarchies. High-Performance
+// Graphics 2009.
+#include "build/bvh_spatial.h"
+
+#include "build/cell.h"
+#include "build/object_split.h"
+#include "build/spatial_split.h"
+#include "build/split.h"
+
+#include <algorithm>
+
+namespace packet {
+
+namespace {
+
+// Overlap that is worth a try, as a share of the root's area: Stich et al. lose nothing by it.
+constexpr float kLeastOfRoot = 1e-5f;
+// And as a share of the node's own: of a million triangles terrain then takes half the time, city a
+// fifth less, for 0.7% of the SAH cost at most.
+constexpr float kLeastOfNode = 0.2f;
+
+float overlap(const Bounds3f& a, const Bounds3f& b) {
+    return Bounds3f{glm::max(a.lower, b.lower), glm::min(a.upper, b.upper)}.half_area();
+}
+
+class SpatialSahSplit {
+public:
+    SpatialSahSplit(MeshView mesh, float root_area, const BuildOptions& options,
+                    const Parallel& parallel)
+        : mesh_(mesh),
+          least_overlap_(kLeastOfRoot * root_area),
+          options_(options),
+          parallel_(parallel) {}
+
+    std::optional<Halves> operator()(const NodeRange& node, int depth) const {
+        const Binning binning(node.bounds.centroids);
+        const ObjectSplit objects = find_object_split(node.refs, binning, parallel_);
+        SpatialSplit space;
+        if (is_worth_cutting(node, objects)) space = find_spatial_split(mesh_, node, parallel_);
+        if (is_leaf(node, std::min(objects.cost, space.cost), options_)) return {};
+        if (space.cost < objects.cost) {
+            if (auto halves = split_space(mesh_, node, space, depth, parallel_)) return halves;
+        }
+        return split_objects(node, binning, objects, depth, parallel_);
+    }
+
+private:
+    [[nodiscard]] bool is_worth_cutting(const NodeRange& node, const ObjectSplit& objects) const {
+        if (node.room == 0) return false;
+        const float area = node.bounds.box.half_area();
+        const float shared =
+            objects.axis < 0 ? area : overlap(objects.bounds[0], objects.bounds[1]);
+        return shared > std::max(least_overlap_, kLeastOfNode * area);
+    }
+
+    MeshView mesh_;
+    float least_overlap_;
+    const BuildOptions& options_;
+    const Parallel& parallel_;
+};
+
+/// How many references cutting may add.
+std::size_t room(std::size_t count, const BuildOptions& options) {
+    const double wanted = static_cast<double>(options.spatial_budget) * static_cast<double>(count);
+    return static_cast<std::size_t>(
+        std::min(wanted, static_cast<double>(kMaxReferences - std::min(count, kMaxReferences))));
+}
+
+}  // namespace
+
+Hierarchy build_bvh_spatial(MeshView mesh, AlignedVector<Reference> references,
+                            const BuildOptions& options, const Parallel& parallel) {
+    NodeBounds root;
+    parallel.run([&] { root = measure(references, parallel); });
+    const std::size_t spare = room(references.size(), options);
+    return TopDownBuilder(std::move(references), spare, parallel,
+                          SpatialSahSplit(mesh, root.box.half_area(), options, parallel))
+        .build();
+}
+
+}  // namespace packet

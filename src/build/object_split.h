@@ -1,0 +1,62 @@
+// Where to part a node's references in two, by their centroids: among the borders of equal bins
+// along each axis, where the expected cost of tracing the halves is least.
+//
+// Wald. On fast construction of SAH-based bounding volume hierarchies. Interactive Ray Tracing
+// 2007.
+#pragma once
+
+#include "build/bin_sweep.h"
+#include "build/lane_bounds.h"
+
+#include <packet/accel.h>
+
+#include <cstdint>
+#include <limits>
+
+namespace packet {
+
+/// Maps centroids to bins. Axes along which centroids do not differ enough to be told apart in
+/// float have scale 0, and all in bin 0.
+class Binning {
+public:
+    explicit Binning(const Bounds3f& centroids);
+
+    [[nodiscard]] bool splits(int axis) const noexcept { return scale_vector_[axis] > 0.0f; }
+    [[nodiscard]] bool splits_any() const noexcept { return scale_vector_ != glm::vec3(0.0f); }
+
+    /// The bins along x, y and z; the last one means nothing.
+    struct BinIds {
+        alignas(16) std::int32_t axis[4];
+    };
+    [[nodiscard]] PACKET_INLINE BinIds bins(const Reference& r) const noexcept {
+        const Lanes x = (centroid2_lanes(r) - origin_) * scale_;
+        BinIds out;
+        xsimd::to_int(xsimd::min(x, Lanes(kBinCount - 0.5f))).store_aligned(out.axis);
+        return out;
+    }
+
+private:
+    glm::vec3 scale_vector_{0.0f};
+    Lanes origin_, scale_;
+};
+
+struct ObjectSplit {
+    float cost = std::numeric_limits<float>::infinity();  ///< of both halves: area times count
+    int axis = -1;                                        ///< -1: none
+    int bin = 0;                                          ///< bins below this go first
+    Bounds3f bounds[2];                                   ///< of the halves
+};
+
+/// The cheapest split, if centroids can be told apart. O(references), on several threads if they
+/// are many.
+[[nodiscard]] ObjectSplit find_object_split(ReferenceSpan refs, const Binning& binning,
+                                            const Parallel& parallel);
+
+/// Whether a node is better a leaf, and may be one, than split at a cost of area times count.
+[[nodiscard]] bool is_leaf(const NodeRange& node, float split_cost, const BuildOptions& options);
+
+/// Parts the references; where a split is none, or not allowed at this depth, into equal halves.
+[[nodiscard]] Halves split_objects(const NodeRange& node, const Binning& binning,
+                                   const ObjectSplit& split, int depth, const Parallel& parallel);
+
+}  // namespace packet

@@ -1,0 +1,36 @@
+// Where to part a node's space in two, and the triangles that reach to both sides with it: among
+// planes between equal slices of its box, where the expected cost of tracing the halves is least.
+//
+// Stich, Friedrich, Dietrich. Spatial splits in bounding volume hierarchies. High-Performance
+// Graphics 2009.
+#pragma once
+
+#include "build/split.h"
+
+#include <cstddef>
+#include <limits>
+#include <optional>
+
+namespace packet {
+
+struct SpatialSplit {
+    float cost = std::numeric_limits<float>::infinity();  ///< of both sides: area times count
+    int axis = -1;                                        ///< -1: none
+    float position = 0.0f;
+    Bounds3f bounds[2];             ///< of the sides, about
+    float count[2] = {0.0f, 0.0f};  ///< references on them, about
+};
+
+/// The cheapest plane among those that add no more references than the node has room for.
+/// O(references), on several threads if they are many.
+[[nodiscard]] SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node,
+                                              const Parallel& parallel);
+
+/// Parts the references at the plane. Those that reach to both sides are cut, if there is room, or
+/// go whole to one side where that is expected to cost less. None, and nothing is cut, where that
+/// might not be allowed at this depth.
+[[nodiscard]] std::optional<Halves> split_space(MeshView mesh, const NodeRange& node,
+                                                const SpatialSplit& split, int depth,
+                                                const Parallel& parallel);
+
+}  // namespace packet
