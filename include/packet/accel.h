@@ -24,8 +24,15 @@ enum class AccelKind : std::uint8_t {
     kGridOfTrees   ///< coarse grid whose crowded cells hold hierarchies of their own
 };
 
+/// How `kKdSah` is built.
+enum class KdBuild : std::uint8_t {
+    kSorted,  ///< cell by cell, by all places where triangles' boxes start and end, sorted once
+    kBreadthFirst  ///< level by level, by some of these while cells are large
+};
+
 struct BuildOptions {
     AccelKind accel = AccelKind::kBvh;
+    KdBuild kd_build = KdBuild::kBreadthFirst;
     /// Largest leaf, in triangles, 1 to 64. Larger leaves build faster and trace slower.
     int max_leaf_size = 8;
     /// Cost of visiting a node, in triangle tests. Raise it for flatter trees with larger leaves.
@@ -75,10 +82,20 @@ struct AccelName {
     std::string_view name;
 };
 
+struct KdBuildName {
+    KdBuild build;
+    std::string_view name;
+};
+
 /// Every structure the library builds, in the order in which help lists them.
 [[nodiscard]] std::span<const AccelName> accel_names() noexcept;
 [[nodiscard]] std::string_view to_string(AccelKind kind) noexcept;
 /// Throws Error{kUnknownName} that lists the valid names.
 [[nodiscard]] AccelKind parse_accel(std::string_view name);
+
+/// Every way to build `kKdSah`.
+[[nodiscard]] std::span<const KdBuildName> kd_build_names() noexcept;
+/// Throws Error{kUnknownName} that lists the valid names.
+[[nodiscard]] KdBuild parse_kd_build(std::string_view name);
 
 }  // namespace packet

@@ -43,6 +43,17 @@ AccelKind parse_accel(std::string_view name) {
     return find_by_name(kAccelNames, name, "structure").kind;
 }
 
+static constexpr std::array kKdBuildNames = {
+    KdBuildName{KdBuild::kSorted, "sorted"},
+    KdBuildName{KdBuild::kBreadthFirst, "breadth-first"},
+};
+
+std::span<const KdBuildName> kd_build_names() noexcept { return kKdBuildNames; }
+
+KdBuild parse_kd_build(std::string_view name) {
+    return find_by_name(kKdBuildNames, name, "way to build a k-d tree").build;
+}
+
 /// `tree(hierarchy)` makes a tree of what most builders hand on.
 template <class MakeTree>
 static Tree build(MeshView mesh, AlignedVector<Reference> references, const BuildOptions& options,

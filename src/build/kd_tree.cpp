@@ -6,6 +6,7 @@
 // Interactive Ray Tracing 2006.
 #include "build/kd_tree.h"
 
+#include "build/kd_breadth_first.h"
 #include "build/kd_cell.h"
 #include "build/kd_events.h"
 #include "build/split.h"
@@ -15,7 +16,6 @@
 #include <packet/error.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 namespace packet {
@@ -32,9 +32,7 @@ public:
 
     Hierarchy build(AlignedVector<Reference> references) {
         if (references.empty()) return {};
-        const auto n = static_cast<double>(references.size());
-        // Wald and Havran: deeper cuts do not pay.
-        max_cut_depth_ = std::min(kMaxDepth, static_cast<int>(8.0 + 1.3 * std::log2(n)));
+        max_cut_depth_ = max_cut_depth(references.size());
         KdCell root;
         fill_root(root, std::move(references), options_, max_references());
         Subtree tree;
@@ -154,6 +152,9 @@ private:
 
 Hierarchy build_kd_tree(KdRule rule, MeshView mesh, AlignedVector<Reference> references,
                         const BuildOptions& options, const Parallel& parallel) {
+    if (rule == KdRule::kSah && options.kd_build == KdBuild::kBreadthFirst) {
+        return build_kd_breadth_first(mesh, std::move(references), options, parallel);
+    }
     Builder builder(rule, mesh, options, parallel);
     if (references.size() > builder.max_references()) {
         throw Error(ErrorCode::kTooLarge, "a k-d tree refers to at most " +
