@@ -78,7 +78,8 @@ int max_cut_depth(std::size_t reference_count) noexcept {
     return std::min(kMaxDepth, static_cast<int>(8.0 + 1.3 * levels));
 }
 
-std::vector<std::uint8_t> halve(std::span<const Reference> references, const Bounds3f& bounds) {
+std::vector<std::uint8_t> sides_of_halves(std::span<const Reference> references,
+                                          const Bounds3f& bounds) {
     const glm::vec3 extent = bounds.extent();
     const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
                      : extent.y >= extent.z                       ? 1
@@ -100,7 +101,7 @@ std::vector<std::uint8_t> halve(std::span<const Reference> references, const Bou
 }
 
 KdChildren halve_cell(const KdCell& cell, const Parallel& parallel) {
-    const std::vector<std::uint8_t> side = halve(cell.references, cell.bounds);
+    const std::vector<std::uint8_t> side = sides_of_halves(cell.references, cell.bounds);
     KdChildren out;
     deal_whole(cell, parallel, out, [&](std::size_t i) { return static_cast<int>(side[i]); });
     inherit(cell, out);

@@ -88,8 +88,8 @@ private:
 
 /// By reference, the side it goes to if each gets half of them, by their centroids along the widest
 /// axis: for what no plane parts, like triangles that share a vertex.
-[[nodiscard]] std::vector<std::uint8_t> halve(std::span<const Reference> references,
-                                              const Bounds3f& bounds);
+[[nodiscard]] std::vector<std::uint8_t> sides_of_halves(std::span<const Reference> references,
+                                                        const Bounds3f& bounds);
 
 /// Where one of the parent's references is now: 2 * index + side, or kCut.
 using KdPlace = std::uint32_t;

@@ -8,7 +8,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <numeric>
+#include <utility>
 
 namespace packet {
 
@@ -35,36 +35,39 @@ struct Chunk {
 struct Cut {
     KdPlane plane;
     std::size_t first_chunk = 0, last_chunk = 0;
+    std::size_t first_bins = 0;  ///< of its chunks, if they are several
     KdRange child[2];
 };
 
-/// One level of cells, all of them large.
-class Level {
+/// Cuts levels of large cells. Arrays keep their memory from level to level: to clear pages of new
+/// memory takes as long as a pass.
+class LargeStage {
 public:
-    Level(MeshView mesh, KdLevel level, const BuildOptions& options, int max_cut_depth,
-          const Parallel& parallel)
+    LargeStage(MeshView mesh, KdLevel root, const BuildOptions& options, const Parallel& parallel)
         : mesh_(mesh),
           options_(options),
           parallel_(parallel),
-          max_cut_depth_(max_cut_depth),
-          level_(std::move(level)),
-          cuts_(level_.cells.size()),
-          sides_(level_.references.size()) {
-        make_chunks();
+          max_cut_depth_(max_cut_depth(root.references.size())),
+          level_(std::move(root)) {
+        out_.nodes.push_back({});
     }
 
-    /// Moves the children to the next level or, if they are small, to `small`.
-    KdLevel cut(KdLevel& small, ScratchVector<BuildNode>& nodes) {
+    [[nodiscard]] bool is_done() const { return level_.cells.empty(); }
+    [[nodiscard]] KdLargeStage take() && { return std::move(out_); }
+
+    void cut_level() {
+        make_chunks();
         find_planes();
         for_chunks([&](Chunk& chunk) { mark(chunk); });
         for_cells([&](std::size_t cell) { halve_if_needed(cell); });
         count_cuts();
         for_chunks([&](Chunk& chunk) { clip(chunk); });
-        KdLevel next;
-        place_children(next, small);
-        for_chunks([&](Chunk& chunk) { move(chunk, next, small); });
-        link_children(next, small, nodes);
-        return next;
+        KdLevel small;
+        place_children(small);
+        for_chunks([&](Chunk& chunk) { move(chunk, small); });
+        link_children(small);
+        if (!small.cells.empty()) out_.small.push_back(std::move(small));
+        std::swap(level_, next_);
     }
 
 private:
@@ -86,6 +89,9 @@ private:
     }
 
     void make_chunks() {
+        cuts_.assign(level_.cells.size(), {});
+        chunks_.clear();
+        std::size_t bins = 0;
         for (std::size_t cell = 0; cell < cuts_.size(); ++cell) {
             cuts_[cell].first_chunk = chunks_.size();
             const std::size_t end = level_.cells[cell].first + level_.cells[cell].count;
@@ -93,29 +99,39 @@ private:
                 chunks_.push_back({cell, i, std::min(end, i + kChunkSize)});
             }
             cuts_[cell].last_chunk = chunks_.size();
+            cuts_[cell].first_bins = bins;
+            if (chunks_of(cell).size() > 1) bins += chunks_of(cell).size();
         }
+        bins_.clear();
+        bins_.resize(bins);
+        sides_.clear();
+        sides_.resize(level_.references.size());
     }
 
     void find_planes() {
-        const auto count = [&](const Chunk& chunk) {
+        for_chunks([&](const Chunk& chunk) {
             KdBins bins;
             bins.add(level_.cells[chunk.cell].bounds,
                      std::span(level_.references).subspan(chunk.first, chunk.last - chunk.first));
-            return bins;
-        };
-        // Only cells of several chunks need the chunks' bins in memory.
-        std::vector<KdBins> bins(chunks_.size());
-        for_chunks([&](Chunk& chunk) {
-            bins[static_cast<std::size_t>(&chunk - chunks_.data())] = count(chunk);
+            const std::span<Chunk> chunks = chunks_of(chunk.cell);
+            if (chunks.size() == 1) {
+                find_plane(chunk.cell, bins);
+            } else {
+                const auto index = static_cast<std::size_t>(&chunk - chunks.data());
+                bins_[cuts_[chunk.cell].first_bins + index] = bins;
+            }
         });
-        for_cells([&](std::size_t i) {
-            Cut& cut = cuts_[i];
-            const KdRange& cell = level_.cells[i];
-            if (cell.depth >= max_cut_depth_) return;
-            KdBins& sum = bins[cut.first_chunk];
-            for (std::size_t c = cut.first_chunk + 1; c < cut.last_chunk; ++c) sum.join(bins[c]);
-            cut.plane = find_cheapest_plane(sum, cell, options_);
+        for_cells([&](std::size_t cell) {
+            const std::size_t count = chunks_of(cell).size();
+            if (count == 1) return;
+            KdBins* const bins = bins_.data() + cuts_[cell].first_bins;
+            for (std::size_t i = 1; i < count; ++i) bins[0].join(bins[i]);
+            find_plane(cell, bins[0]);
         });
+    }
+    void find_plane(std::size_t i, const KdBins& bins) {
+        const KdRange& cell = level_.cells[i];
+        if (cell.depth < max_cut_depth_) cuts_[i].plane = find_cheapest_plane(bins, cell, options_);
     }
 
     void mark(Chunk& chunk) {
@@ -144,7 +160,8 @@ private:
         const bool is_cut = cuts_[i].plane.is_cut();
         if (is_cut && fits_depth(cell.depth + 1, std::max(counts[0], counts[1]))) return;
         cuts_[i].plane = {};
-        const std::vector<std::uint8_t> sides = halve(level_.references_of(cell), cell.bounds);
+        const std::vector<std::uint8_t> sides =
+            sides_of_halves(level_.references_of(cell), cell.bounds);
         std::copy(sides.begin(), sides.end(),
                   sides_.begin() + static_cast<std::ptrdiff_t>(cell.first));
         for (Chunk& chunk : chunks_of(i)) count(chunk);
@@ -156,6 +173,7 @@ private:
             chunk.first_cut = count;
             count += chunk.cut_count;
         }
+        parts_.clear();
         parts_.resize(count);
     }
 
@@ -171,7 +189,7 @@ private:
     }
 
     /// Where each chunk's references go: those of a child are one range.
-    void place_children(KdLevel& next, KdLevel& small) {
+    void place_children(KdLevel& small) {
         std::size_t next_count = 0, small_count = 0;
         for (std::size_t i = 0; i < cuts_.size(); ++i) {
             const KdRange& cell = level_.cells[i];
@@ -188,15 +206,16 @@ private:
             }
             share_out<KdRange>(cell, child);
         }
-        next.references.resize(next_count);
+        next_.references.clear();
+        next_.references.resize(next_count);
         small.references.resize(small_count);
     }
     static bool is_small(const KdRange& cell) { return cell.count <= kMaxSmallCell; }
 
-    void move(Chunk& chunk, KdLevel& next, KdLevel& small) {
+    void move(Chunk& chunk, KdLevel& small) {
         Reference* to[2];
         for (std::size_t s = 0; s < 2; ++s) {
-            KdLevel& level = is_small(cuts_[chunk.cell].child[s]) ? small : next;
+            KdLevel& level = is_small(cuts_[chunk.cell].child[s]) ? small : next_;
             to[s] = level.references.data() + chunk.place[s];
         }
         const auto put = [&](std::size_t s, const Reference& r) {
@@ -216,7 +235,9 @@ private:
         }
     }
 
-    void link_children(KdLevel& next, KdLevel& small, ScratchVector<BuildNode>& nodes) {
+    void link_children(KdLevel& small) {
+        ScratchVector<BuildNode>& nodes = out_.nodes;
+        next_.cells.clear();
         for (std::size_t i = 0; i < cuts_.size(); ++i) {
             auto& child = cuts_[i].child;
             for (const Chunk& chunk : chunks_of(i)) {
@@ -235,7 +256,7 @@ private:
                 if (child[s].count == 0) continue;
                 // A node of one child is that child.
                 child[s].node = has_two ? nodes[node].child(static_cast<int>(s)) : node;
-                (is_small(child[s]) ? small : next).cells.push_back(child[s]);
+                (is_small(child[s]) ? small : next_).cells.push_back(child[s]);
             }
         }
     }
@@ -244,9 +265,12 @@ private:
     const BuildOptions& options_;
     const Parallel& parallel_;
     int max_cut_depth_;
-    KdLevel level_;
+    KdLevel level_, next_;
+    KdLargeStage out_;
+    // Of the level:
     std::vector<Cut> cuts_;
     std::vector<Chunk> chunks_;
+    ScratchVector<KdBins> bins_;
     ScratchVector<std::uint8_t> sides_;  ///< where each reference goes
     ScratchVector<CutReference> parts_;  ///< of those that go to both sides
 };
@@ -256,27 +280,23 @@ private:
 KdLargeStage run_large_stage(MeshView mesh, KdLevel root, const BuildOptions& options,
                              const Parallel& parallel, double share) {
     const std::size_t count = root.references.size();
-    KdLargeStage out;
-    out.nodes.push_back({});
     if (count <= kMaxSmallCell) {
+        KdLargeStage out;
+        out.nodes.push_back({});
         out.small.push_back(std::move(root));
         parallel.advance(share);
         return out;
     }
-    const int max_depth = max_cut_depth(count);
-    const double levels = std::bit_width(count / kMaxSmallCell) + 1;  // about
+    // There are often more, of few cells.
+    const auto levels = static_cast<double>(std::bit_width(count / kMaxSmallCell));
     double left = share;
-    for (KdLevel level = std::move(root); !level.cells.empty();) {
-        KdLevel small;
-        Level current(mesh, std::move(level), options, max_depth, parallel);
-        level = current.cut(small, out.nodes);
-        if (!small.cells.empty()) out.small.push_back(std::move(small));
-        const double part = std::min(left, share / levels);
+    for (LargeStage stage(mesh, std::move(root), options, parallel);;) {
+        stage.cut_level();
+        const double part = stage.is_done() ? left : std::min(left, share / levels);
         left -= part;
         parallel.advance(part);
+        if (stage.is_done()) return std::move(stage).take();
     }
-    parallel.advance(left);
-    return out;
 }
 
 }  // namespace packet

@@ -74,7 +74,8 @@ void KdMasks::sweep(const Axis& places, int axis, KdSet set, const KdRange& cell
         if (place.position < cell.bounds.lower[axis]) break;
         const std::size_t below = size_of(place.before & set);
         const std::size_t above = size_of(place.behind & set);
-        const std::size_t flat = size_of(set & ~(place.before | place.behind));
+        const KdSet in_plane = set & ~(place.before | place.behind);
+        const std::size_t flat = in_plane == 0 ? 0 : size_of(in_plane);
         // Nothing lies between a plane that cuts nothing and where the next box starts.
         const bool is_gap = below + flat + above == cell.count;
         const float p = place.position;
