@@ -26,12 +26,14 @@ enum class AccelKind : std::uint8_t {
 
 /// How `kKdSah` is built.
 enum class KdBuild : std::uint8_t {
-    kSorted,  ///< cell by cell, by all places where triangles' boxes start and end, sorted once
-    kBreadthFirst  ///< level by level, by some of these while cells are large
+    kSorted,       ///< cell by cell, from all places where triangles' boxes start and end, sorted
+    kBreadthFirst  ///< level by level; while cells are large, from some of these places
 };
 
 struct BuildOptions {
     AccelKind accel = AccelKind::kBvh;
+    /// For `kKdSah`. By levels generated scenes of a million triangles are built in about two
+    /// thirds of the time, with 0.4 to 3% more SAH cost, and there may be 2^31 triangles, not 2^30.
     KdBuild kd_build = KdBuild::kBreadthFirst;
     /// Largest leaf, in triangles, 1 to 64. Larger leaves build faster and trace slower.
     int max_leaf_size = 8;
@@ -82,6 +84,7 @@ struct AccelName {
     std::string_view name;
 };
 
+/// The name of a way to build `kKdSah`.
 struct KdBuildName {
     KdBuild build;
     std::string_view name;

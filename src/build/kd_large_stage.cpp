@@ -7,6 +7,7 @@
 #include "core/macros.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <utility>
 
@@ -28,7 +29,7 @@ struct Chunk {
     std::size_t cut_count = 0;      ///< of these, how many go to both sides
     std::size_t first_cut = 0;
     std::size_t place[2] = {0, 0};  ///< of the first one of each side, in the array it goes to
-    Bounds3f bounds[2];             ///< of what goes to each side
+    std::array<Bounds3f, 2> bounds = {};  ///< of what goes to each side
 };
 
 /// A cell of the level, while it is cut.
