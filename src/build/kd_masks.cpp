@@ -65,23 +65,25 @@ void KdMasks::sweep(const Axis& places, int axis, KdSet set, const KdRange& cell
         const double c = cost.cut(axis, end, begin, counts);
         if (c < best.cost) best = {c, position, axis, flat_side};
     };
-    float next_start = cell.bounds.upper[axis];  // behind the place
+    float next_start = cell.bounds.upper[axis];  // of what is not in the plane or below
     for (std::size_t i = places.count; i-- > 0;) {
         const Place& place = places.places[i];
-        if (((place.starts | place.ends) & set) == 0 || place.position > cell.bounds.upper[axis]) {
+        const float p = place.position;
+        if (((place.starts | place.ends) & set) == 0 || p > cell.bounds.upper[axis]) {
             continue;
         }
-        if (place.position < cell.bounds.lower[axis]) break;
+        if (p < cell.bounds.lower[axis]) break;
         const std::size_t below = size_of(place.before & set);
         const std::size_t above = size_of(place.behind & set);
         const KdSet in_plane = set & ~(place.before | place.behind);
         const std::size_t flat = in_plane == 0 ? 0 : size_of(in_plane);
+        if ((place.starts & place.behind & set) != 0) next_start = p;
         // Nothing lies between a plane that cuts nothing and where the next box starts.
         const bool is_gap = below + flat + above == cell.count;
-        const float p = place.position;
         consider(p, p, is_gap ? next_start : p, below + flat, above, 0);
-        if (flat != 0) consider(p, p, p, below, above + flat, 1);
-        if ((place.starts & set) != 0) next_start = p;
+        if (flat == 0) continue;
+        consider(p, p, p, below, above + flat, 1);
+        next_start = p;
     }
 }
 
