@@ -32,8 +32,8 @@ enum class KdBuild : std::uint8_t {
 
 struct BuildOptions {
     AccelKind accel = AccelKind::kBvh;
-    /// For `kKdSah`. By levels generated scenes of a million triangles are built in about two
-    /// thirds of the time, with 0.4 to 3% more SAH cost, and there may be 2^31 triangles, not 2^30.
+    /// For `kKdSah`. By levels a million triangles take half to two thirds of the time, at 1% less
+    /// to 2% more SAH cost in generated scenes, and there may be 2^31 of them, not 2^30.
     KdBuild kd_build = KdBuild::kBreadthFirst;
     /// Largest leaf, in triangles, 1 to 64. Larger leaves build faster and trace slower.
     int max_leaf_size = 8;

@@ -15,7 +15,8 @@
 
 namespace packet {
 
-/// Of 16, 32 and 64 the SAH cost of generated scenes differs little: docs/benchmarking.md.
+/// 16 make generated scenes' SAH cost up to 1% higher, 64 up to 0.4% lower or 0.7% higher; in build
+/// time there is no difference to be seen.
 inline constexpr std::size_t kKdBinCount = 32;
 
 struct KdBin {
