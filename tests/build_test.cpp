@@ -1,4 +1,5 @@
 // Structures: what any of them must hold, whatever the triangles.
+#include "configurations.h"
 #include "generate.h"
 #include "test_rays.h"
 
@@ -179,11 +180,9 @@ Walked check_tree(const TriangleMesh& mesh, const BuildOptions& options = {}) {
 /// fn(options) for every structure.
 template <class Fn>
 void for_each_accel(Fn fn) {
-    for (const AccelName& accel : accel_names()) {
-        CAPTURE(accel.name);
-        BuildOptions options;
-        options.accel = accel.kind;
-        fn(options);
+    for (const Build& build : all_builds()) {
+        CAPTURE(build.name);
+        fn(build.options);
     }
 }
 
@@ -294,11 +293,8 @@ TEST_CASE("leaves are no larger than asked") {
 }
 
 TEST_CASE("the tree is the same, to the byte, for any number of threads and every time") {
-    for (const AccelName& accel : accel_names()) {
-        CAPTURE(accel.name);
-        const TriangleMesh mesh = tools::make_city(120000, 5);
-        BuildOptions options;
-        options.accel = accel.kind;
+    const TriangleMesh mesh = tools::make_city(120000, 5);
+    for_each_accel([&](BuildOptions options) {
         options.threads = 1;
         const auto want = bytes_of(build_tree(mesh.view(), options));
         for (const int threads : {1, 2, 8}) {
@@ -307,7 +303,7 @@ TEST_CASE("the tree is the same, to the byte, for any number of threads and ever
                 CHECK(bytes_of(build_tree(mesh.view(), options)) == want);
             }
         }
-    }
+    });
 }
 
 TEST_CASE("the surface area heuristic beats halving") {

@@ -31,6 +31,23 @@ static void report_skipped_isas() {
     (void)once;
 }
 
+std::vector<Build> all_builds() {
+    std::vector<Build> out;
+    for (const AccelName& accel : accel_names()) {
+        BuildOptions options;
+        options.accel = accel.kind;
+        if (accel.kind != AccelKind::kKdSah) {
+            out.push_back({std::string(accel.name), options});
+            continue;
+        }
+        for (const KdBuildName& way : kd_build_names()) {
+            options.kd_build = way.build;
+            out.push_back({std::string(accel.name) + " " + std::string(way.name), options});
+        }
+    }
+    return out;
+}
+
 std::vector<Configuration> all_configurations(AccelKind accel) {
     report_skipped_isas();
     std::vector<Configuration> out;
@@ -76,11 +93,10 @@ static void check_configuration(const Scene& scene, std::span<const Ray> rays,
 void check_agreement(Scene scene, std::span<const Ray> rays, const std::string& label) {
     INFO(label);
     const std::vector<Hit> want = Oracle(scene).closest(rays);
-    for (const AccelName& accel : accel_names()) {
-        BuildOptions options;
-        options.accel = accel.kind;
-        scene.commit(options);
-        for (const Configuration& configuration : all_configurations(accel.kind)) {
+    for (const Build& build : all_builds()) {
+        INFO(build.name);
+        scene.commit(build.options);
+        for (const Configuration& configuration : all_configurations(build.options.accel)) {
             check_configuration(scene, rays, want, configuration);
         }
     }

@@ -23,6 +23,15 @@ struct Configuration {
     [[nodiscard]] TraceOptions trace_options() const;
 };
 
+/// A way to build a structure.
+struct Build {
+    std::string name;
+    BuildOptions options;
+};
+
+/// Every structure, in each way that it is built.
+[[nodiscard]] std::vector<Build> all_builds();
+
 /// Modes x instruction sets that this CPU runs, on one thread, and on 2 and 3 threads by the best
 /// of them. What the CPU lacks is reported once as skipped.
 [[nodiscard]] std::vector<Configuration> all_configurations(AccelKind accel);
@@ -31,8 +40,9 @@ struct Configuration {
 [[nodiscard]] std::size_t count_differences(std::span<const Ray> rays, std::span<const Hit> want,
                                             std::span<const Hit> got);
 
-/// Builds every structure over the scene, traces the rays in every configuration, closest-hit and
-/// any-hit, and CHECKs that all are equal to the oracle, bit for bit. `label` names the case.
+/// Builds every structure over the scene, in each way, traces the rays in every configuration,
+/// closest-hit and any-hit, and CHECKs that all are equal to the oracle, bit for bit. `label` names
+/// the case.
 void check_agreement(Scene scene, std::span<const Ray> rays, const std::string& label);
 
 }  // namespace packet::test

@@ -106,8 +106,17 @@ double cheapest_cost(const KdCell& cell, const BuildOptions& options) {
     return best;
 }
 
-constexpr AccelKind kCellTrees[] = {AccelKind::kKdMidpoint, AccelKind::kKdMedian, AccelKind::kKdSah,
-                                    AccelKind::kOctree};
+/// Every tree of cells, in each way that it is built.
+std::vector<Build> cell_trees() {
+    std::vector<Build> out = all_builds();
+    std::erase_if(out, [](const Build& build) {
+        constexpr AccelKind kKinds[] = {AccelKind::kKdMidpoint, AccelKind::kKdMedian,
+                                        AccelKind::kKdSah, AccelKind::kOctree};
+        return std::find(std::begin(kKinds), std::end(kKinds), build.options.accel) ==
+               std::end(kKinds);
+    });
+    return out;
+}
 
 }  // namespace
 
@@ -212,12 +221,11 @@ TEST_CASE("the reference cap holds, is used, and leaves every triangle in the tr
         const glm::vec3 p = random.point(), q = random.point();
         add_triangle(mesh, p, q, q + 0.001f * random.direction());
     }
-    for (const AccelKind kind : kCellTrees) {
-        CAPTURE(to_string(kind));
+    for (const Build& build : cell_trees()) {
+        CAPTURE(build.name);
         std::size_t last = 0;
         for (const float factor : {1.0f, 3.0f, 10.0f, 64.0f}) {
-            BuildOptions options;
-            options.accel = kind;
+            BuildOptions options = build.options;
             options.max_reference_factor = factor;
             const std::size_t references = reference_count(build_tree(mesh.view(), options));
             CHECK(static_cast<float>(references) <= factor * 2000.0f);
@@ -238,9 +246,9 @@ TEST_CASE("a fan about one vertex, which no plane parts, ends in leaves as small
         const float x = static_cast<float>(i) / 3000.0f, y = x + 1.0f / 3000.0f;
         add_triangle(mesh, {0, 0, 0}, {1 - x, x, 1}, {1 - y, y, 1});
     }
-    for (const AccelKind kind : kCellTrees) {
-        BuildOptions options;
-        options.accel = kind;
+    for (const Build& build : cell_trees()) {
+        CAPTURE(build.name);
+        BuildOptions options = build.options;
         options.max_leaf_size = 4;
         const Tree tree = build_tree(mesh.view(), options);
         CHECK(tree.stats.depth <= kMaxDepth);
@@ -256,10 +264,9 @@ TEST_CASE("inner nodes have two children that hold something, and empty space is
             add_triangle(mesh, {x, y, 0}, {x + 1, y, 0}, {x, y + 1, 0});
         }
     }
-    for (const AccelKind kind : kCellTrees) {
-        BuildOptions options;
-        options.accel = kind;
-        const Tree tree = build_tree(mesh.view(), options);
+    for (const Build& build : cell_trees()) {
+        CAPTURE(build.name);
+        const Tree tree = build_tree(mesh.view(), build.options);
         CHECK(tree.stats.leaf_count == (tree.stats.node_count + 1) / 2);
         for (const Node& node : tree.nodes) {
             if (node.is_leaf()) CHECK(node.plane[1][0] - node.plane[0][0] <= 1.0f);

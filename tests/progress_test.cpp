@@ -1,4 +1,5 @@
 // Builds that tell how far they are, and are cancelled.
+#include "configurations.h"
 #include "generate.h"
 #include "test_rays.h"
 
@@ -17,12 +18,11 @@ namespace {
 /// fn(options) for every structure, on one thread and on two.
 template <class Fn>
 void for_each_build(Fn fn) {
-    for (const AccelName& accel : accel_names()) {
+    for (const Build& build : all_builds()) {
         for (const int threads : {1, 2}) {
-            CAPTURE(accel.name);
+            CAPTURE(build.name);
             CAPTURE(threads);
-            BuildOptions options;
-            options.accel = accel.kind;
+            BuildOptions options = build.options;
             options.threads = threads;
             fn(options);
         }

@@ -99,6 +99,9 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
     add_name_option(app, "--accel", "Acceleration structure", list_names(accel_names()),
                     [&](std::string_view name) { options.build.accel = parse_accel(name); })
         ->default_str("bvh");
+    add_name_option(app, "--kd-build", "Of kd-sah", list_names(kd_build_names()),
+                    [&](std::string_view name) { options.build.kd_build = parse_kd_build(name); })
+        ->default_str("breadth-first");
     add_name_option(app, "--quality", "Of the bvh, which chooses its builder",
                     list_names(quality_names()),
                     [&](std::string_view name) { options.build.quality = parse_quality(name); })

@@ -76,6 +76,17 @@ AccelKind chosen_accel(const BuildOptions& options) {
     return options.quality == BuildQuality::kFast ? AccelKind::kBvhMorton : AccelKind::kBvhSpatial;
 }
 
+static constexpr std::array kKdBuildNames = {
+    KdBuildName{KdBuild::kSorted, "sorted"},
+    KdBuildName{KdBuild::kBreadthFirst, "breadth-first"},
+};
+
+std::span<const KdBuildName> kd_build_names() noexcept { return kKdBuildNames; }
+
+KdBuild parse_kd_build(std::string_view name) {
+    return find_by_name(kKdBuildNames, name, "way to build a k-d tree").build;
+}
+
 /// `tree(hierarchy)` makes a tree of what most builders hand on.
 template <class MakeTree>
 static Tree build(AccelKind kind, MeshView mesh, AlignedVector<Reference> references,

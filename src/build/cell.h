@@ -23,6 +23,7 @@ struct Cell {
     double work = 1.0;                    ///< how much of the build it is
     int depth = 0;
 
+    [[nodiscard]] std::size_t reference_count() const noexcept { return references.size(); }
     void add(const Reference& r) {
         references.push_back(r);
         bounds.extend(r.bounds());
@@ -46,24 +47,24 @@ inline void fill_root(Cell& root, AlignedVector<Reference> references, const Bui
 }
 
 /// Whether the parts of a cell have no more references together than they may.
-template <class Child>
-[[nodiscard]] bool is_within_spare(const Cell& cell, std::span<const Child> children) {
+template <class Child, class Parent>
+[[nodiscard]] bool is_within_spare(const Parent& cell, std::span<const Child> children) {
     std::size_t count = 0;
-    for (const Child& child : children) count += child.references.size();
-    return count <= cell.references.size() + cell.spare;
+    for (const Child& child : children) count += child.reference_count();
+    return count <= cell.reference_count() + cell.spare;
 }
 
 /// Work, and the references that the cut has not used up, are shared in proportion to the parts'
 /// references.
-template <class Child>
-void share_out(const Cell& cell, std::span<Child> children) {
-    PACKET_ASSERT(is_within_spare(cell, std::span<const Child>(children)));
+template <class Child, class Parent>
+void share_out(const Parent& cell, std::span<Child> children) {
+    PACKET_ASSERT(is_within_spare<Child>(cell, children));
     std::size_t count = 0;
-    for (const Child& child : children) count += child.references.size();
-    const std::size_t left = cell.references.size() + cell.spare - count;
+    for (const Child& child : children) count += child.reference_count();
+    const std::size_t left = cell.reference_count() + cell.spare - count;
     std::size_t rest = left;
     for (Child& child : children) {
-        const double share = static_cast<double>(child.references.size()) /
+        const double share = static_cast<double>(child.reference_count()) /
                              static_cast<double>(std::max<std::size_t>(count, 1));
         child.spare =
             &child == &children.back()

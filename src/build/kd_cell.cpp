@@ -1,18 +1,20 @@
 #include "build/kd_cell.h"
 
 #include "build/clip.h"
-#include "core/macros.h"
+#include "core/views.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace packet {
 
-KdCost::KdCost(const KdCell& cell, const BuildOptions& options) noexcept {
+KdCost::KdCost(const Bounds3f& cell, std::size_t reference_count,
+               const BuildOptions& options) noexcept {
     double extent[3];
     for (int a = 0; a < 3; ++a) {
-        lower_[a] = static_cast<double>(cell.bounds.lower[a]);
-        upper_[a] = static_cast<double>(cell.bounds.upper[a]);
+        lower_[a] = static_cast<double>(cell.lower[a]);
+        upper_[a] = static_cast<double>(cell.upper[a]);
         extent[a] = upper_[a] - lower_[a];
     }
     for (int a = 0; a < 3; ++a) {
@@ -22,7 +24,7 @@ KdCost::KdCost(const KdCell& cell, const BuildOptions& options) noexcept {
     const double whole = area(0, extent[0]);
     intersection_ = static_cast<double>(options.intersection_cost);
     traversal_ = static_cast<double>(options.traversal_cost) * whole;
-    leaf_ = intersection_ * whole * static_cast<double>(cell.references.size());
+    leaf_ = intersection_ * whole * static_cast<double>(reference_count);
 }
 
 // References: about a millisecond of work.
@@ -71,15 +73,21 @@ KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane,
     return out;
 }
 
-KdChildren halve_cell(const KdCell& cell, const Parallel& parallel) {
-    const glm::vec3 extent = cell.bounds.extent();
+int max_cut_depth(std::size_t reference_count) noexcept {
+    const double levels = std::log2(static_cast<double>(reference_count));
+    return std::min(kMaxDepth, static_cast<int>(8.0 + 1.3 * levels));
+}
+
+std::vector<std::uint8_t> sides_of_halves(std::span<const Reference> references,
+                                          const Bounds3f& bounds) {
+    const glm::vec3 extent = bounds.extent();
     const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
                      : extent.y >= extent.z                       ? 1
                                                                   : 2;
     const auto centroid2 = [&](std::uint32_t i) {
-        return cell.references[i].lower[axis] + cell.references[i].upper[axis];
+        return references[i].lower[axis] + references[i].upper[axis];
     };
-    std::vector<std::uint32_t> order(cell.references.size());
+    std::vector<std::uint32_t> order(references.size());
     std::iota(order.begin(), order.end(), 0u);
     const std::size_t half = order.size() / 2;
     std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half), order.end(),
@@ -89,6 +97,11 @@ KdChildren halve_cell(const KdCell& cell, const Parallel& parallel) {
                      });
     std::vector<std::uint8_t> side(order.size(), 0);
     for (std::size_t i = half; i < order.size(); ++i) side[order[i]] = 1;
+    return side;
+}
+
+KdChildren halve_cell(const KdCell& cell, const Parallel& parallel) {
+    const std::vector<std::uint8_t> side = sides_of_halves(cell.references, cell.bounds);
     KdChildren out;
     deal_whole(cell, parallel, out, [&](std::size_t i) { return static_cast<int>(side[i]); });
     inherit(cell, out);

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace packet {
@@ -42,9 +43,10 @@ struct KdCounts {
     std::size_t side[2] = {0, 0};
 
     /// A cut must leave something on both sides and not add more references than the cell may.
-    [[nodiscard]] bool allow_cut(const KdCell& cell) const noexcept {
+    template <class AnyCell>
+    [[nodiscard]] bool allow_cut(const AnyCell& cell) const noexcept {
         return side[0] != 0 && side[1] != 0 &&
-               side[0] + side[1] <= cell.references.size() + cell.spare;
+               side[0] + side[1] <= cell.reference_count() + cell.spare;
     }
 };
 
@@ -52,7 +54,10 @@ struct KdCounts {
 /// flat cells need no division.
 class KdCost {
 public:
-    KdCost(const KdCell& cell, const BuildOptions& options) noexcept;
+    KdCost(const Bounds3f& cell, std::size_t reference_count, const BuildOptions& options) noexcept;
+    template <class AnyCell>
+    KdCost(const AnyCell& cell, const BuildOptions& options) noexcept
+        : KdCost(cell.bounds, cell.reference_count(), options) {}
 
     [[nodiscard]] double leaf() const noexcept { return leaf_; }
     /// One side ends at `end` and the other begins at `begin`, at most what lies between is empty.
@@ -77,6 +82,15 @@ private:
     double intersection_, traversal_, leaf_;
 };
 
+/// No cell is cut that is this deep in a tree over so many references. Wald and Havran: deeper cuts
+/// do not pay.
+[[nodiscard]] int max_cut_depth(std::size_t reference_count) noexcept;
+
+/// By reference, the side it goes to if each gets half of them, by their centroids along the widest
+/// axis: for what no plane parts, like triangles that share a vertex.
+[[nodiscard]] std::vector<std::uint8_t> sides_of_halves(std::span<const Reference> references,
+                                                        const Bounds3f& bounds);
+
 /// Where one of the parent's references is now: 2 * index + side, or kCut.
 using KdPlace = std::uint32_t;
 inline constexpr KdPlace kCut = 0xFFFFFFFF;
@@ -94,8 +108,7 @@ struct KdChildren {
 [[nodiscard]] KdChildren cut_cell(MeshView mesh, const KdCell& cell, const KdPlane& plane,
                                   const Parallel& parallel);
 
-/// Deals the references out to two children that may overlap, half to each, by their centroids
-/// along the widest axis: for what no plane parts, like triangles that share a vertex.
+/// Deals the references out to two children that may overlap, half to each.
 [[nodiscard]] KdChildren halve_cell(const KdCell& cell, const Parallel& parallel);
 
 }  // namespace packet

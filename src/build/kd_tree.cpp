@@ -1,6 +1,7 @@
-// Every k-d tree is built by the same recursion: find a plane by the tree's rule, cut the cell, and
-// again. Cells shrink to what they hold, so nodes are boxes as in any other tree and no space that
-// is empty is ever in one. What no plane parts well is dealt out to two nodes that overlap.
+// Every k-d tree but that of kd_levels.h is built by the same recursion: find a plane by the tree's
+// rule, cut the cell, and again. Cells shrink to what they hold, so nodes are boxes as in any other
+// tree and no space that is empty is ever in one. What no plane parts well is dealt out to two
+// nodes that overlap.
 //
 // Wald, Havran. On building fast kd-trees for ray tracing, and on doing that in O(N log N).
 // Interactive Ray Tracing 2006.
@@ -8,6 +9,7 @@
 
 #include "build/kd_cell.h"
 #include "build/kd_events.h"
+#include "build/kd_levels.h"
 #include "build/split.h"
 #include "build/subtree.h"
 #include "core/macros.h"
@@ -15,7 +17,6 @@
 #include <packet/error.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 namespace packet {
@@ -30,23 +31,18 @@ public:
     Builder(KdRule rule, MeshView mesh, const BuildOptions& options, const Parallel& parallel)
         : rule_(rule), mesh_(mesh), options_(options), parallel_(parallel) {}
 
-    Hierarchy build(AlignedVector<Reference> references) {
+    /// With at most `most` references.
+    Hierarchy build(AlignedVector<Reference> references, std::size_t most) {
         if (references.empty()) return {};
-        const auto n = static_cast<double>(references.size());
-        // Wald and Havran: deeper cuts do not pay.
-        max_cut_depth_ = std::min(kMaxDepth, static_cast<int>(8.0 + 1.3 * std::log2(n)));
+        max_cut_depth_ = max_cut_depth(references.size());
         KdCell root;
-        fill_root(root, std::move(references), options_, max_references());
+        fill_root(root, std::move(references), options_, most);
         Subtree tree;
         parallel_.run([&] {
             if (rule_ == KdRule::kSah) root.events = make_events(root.references, parallel_);
             build_node(std::move(root), tree);
         });
         return to_hierarchy(std::move(tree), parallel_);
-    }
-
-    [[nodiscard]] std::size_t max_references() const {
-        return rule_ == KdRule::kSah ? kMaxEventReferences : kMaxReferences;
     }
 
 private:
@@ -154,13 +150,15 @@ private:
 
 Hierarchy build_kd_tree(KdRule rule, MeshView mesh, AlignedVector<Reference> references,
                         const BuildOptions& options, const Parallel& parallel) {
-    Builder builder(rule, mesh, options, parallel);
-    if (references.size() > builder.max_references()) {
-        throw Error(ErrorCode::kTooLarge, "a k-d tree refers to at most " +
-                                              std::to_string(builder.max_references()) +
-                                              " triangles");
+    const bool by_levels = rule == KdRule::kSah && options.kd_build == KdBuild::kBreadthFirst;
+    const std::size_t most =
+        rule == KdRule::kSah && !by_levels ? kMaxEventReferences : kMaxReferences;
+    if (references.size() > most) {
+        throw Error(ErrorCode::kTooLarge,
+                    "a k-d tree refers to at most " + std::to_string(most) + " triangles");
     }
-    return builder.build(std::move(references));
+    if (by_levels) return build_kd_levels(mesh, std::move(references), options, parallel);
+    return Builder(rule, mesh, options, parallel).build(std::move(references), most);
 }
 
 }  // namespace packet

@@ -19,7 +19,7 @@ enum class KdRule {
 /// options.max_reference_factor references a triangle. Every leaf holds at most
 /// `options.max_leaf_size` of them; no leaf is deeper than kMaxDepth. O(n log n) time; parallel;
 /// the result does not depend on the number of threads. Throws Error{kTooLarge} for more than 2^30
-/// triangles by kSah.
+/// triangles by kSah and sorted events.
 [[nodiscard]] Hierarchy build_kd_tree(KdRule rule, MeshView mesh,
                                       AlignedVector<Reference> references,
                                       const BuildOptions& options, const Parallel& parallel);
