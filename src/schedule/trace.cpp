@@ -26,8 +26,9 @@ constexpr std::array kModeNames = {
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
 constexpr std::size_t kRaysPerTask = 512;
-// Where there are rays enough auto tries packets of 16 beside what the rays' looks suggest. Packets
-// of 8 never won by much. It does so this many times, each time on neighbouring tasks,
+// Rays that look coherent go by tiles, which nothing beats. For the others, if there are enough, auto
+// tries packets of 16 beside single rays: short rays gain by them. Packets of 8 never won by much. It
+// does so this many times, each time on neighbouring tasks,
 constexpr std::size_t kTrialPairs = 5;
 // if that is so little of the whole that the slower tries do not count.
 constexpr std::size_t kLeastTasksForTrial = 128;
@@ -91,7 +92,7 @@ public:
         const bool is_auto = options.mode == Mode::kAuto;
         const Mode mode = is_auto ? choose_mode(rays, scene_.top.bounds) : options.mode;
         kernel_ = kernel_of(mode);
-        tries_ = is_auto && tasks_.count() >= kLeastTasksForTrial;
+        tries_ = is_auto && mode == Mode::kSingle && tasks_.count() >= kLeastTasksForTrial;
     }
 
     void run(const Kernels& kernels, Hit* hits, std::uint8_t* occluded) const {
