@@ -26,7 +26,7 @@ constexpr std::array kModeNames = {
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
 constexpr std::size_t kRaysPerTask = 512;
-// Rays that look coherent go by tiles, which nothing beats. For the others, if there are enough,
+// Rays that look coherent go by tiles, which seldom lose. For the others, if there are enough,
 // auto tries packets of 16 beside single rays: short rays gain by them. Packets of 8 never won by
 // much. It does so this many times, each time on neighbouring tasks,
 constexpr std::size_t kTrialPairs = 5;
