@@ -5,6 +5,7 @@
 #include "build/grid_layout.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 namespace packet {
@@ -34,9 +35,9 @@ Reference make_reference(MeshView mesh, std::uint32_t id, const Bounds3f& cell) 
 
 class TreesBuilder {
 public:
-    TreesBuilder(const CellLists& cells, MeshView mesh, const BuildOptions& options,
+    TreesBuilder(const CellLists& cells, MeshView mesh, BuildOptions options,
                  const Parallel& parallel)
-        : cells_(cells), mesh_(mesh), options_(options), parallel_(parallel) {
+        : cells_(cells), mesh_(mesh), options_(std::move(options)), parallel_(parallel) {
         options_.traversal_cost *= kNodeCost;
         for (std::size_t i = 0; i < cells.lists.size(); ++i) {
             if (cells.lists[i].count > kLongestList) crowded_.push_back(i);

@@ -164,10 +164,9 @@ struct Groups {
     int shift;
     std::size_t count;
 
-    explicit Groups(std::size_t cell_numbers) {
-        shift = std::max(6, static_cast<int>(std::bit_width((cell_numbers - 1) / kMostGroups)));
-        count = ((cell_numbers - 1) >> shift) + 1;
-    }
+    explicit Groups(std::size_t cell_numbers)
+        : shift(std::max(6, static_cast<int>(std::bit_width((cell_numbers - 1) / kMostGroups)))),
+          count(((cell_numbers - 1) >> shift) + 1) {}
     [[nodiscard]] std::size_t group_of(std::uint32_t cell) const { return cell >> shift; }
     [[nodiscard]] std::size_t cells() const { return std::size_t{1} << shift; }
 };

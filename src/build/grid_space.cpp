@@ -70,7 +70,7 @@ CellRange GridSpace::range_of(const Bounds3f& box) const noexcept {
     for (int a = 0; a < 3; ++a) {
         out.first[a] = cell_at(a, box.lower[a]);
         out.last[a] = cell_at(a, box.upper[a]);
-        while (out.last[a] > out.first[a] && planes_[a].data()[out.last[a]] >= box.upper[a]) {
+        while (out.last[a] > out.first[a] && plane(a, out.last[a]) >= box.upper[a]) {
             --out.last[a];
         }
     }
@@ -80,8 +80,8 @@ CellRange GridSpace::range_of(const Bounds3f& box) const noexcept {
 Bounds3f GridSpace::box_of(const CellRange& range) const noexcept {
     Bounds3f out;
     for (int a = 0; a < 3; ++a) {
-        out.lower[a] = planes_[a].data()[range.first[a]];
-        out.upper[a] = planes_[a].data()[range.last[a] + 1];
+        out.lower[a] = plane(a, range.first[a]);
+        out.upper[a] = plane(a, range.last[a] + 1);
     }
     return out;
 }

@@ -69,6 +69,9 @@ public:
 
 private:
     [[nodiscard]] int cell_at(int axis, float x) const noexcept;
+    [[nodiscard]] float plane(int axis, int i) const noexcept {
+        return planes_[axis][static_cast<std::size_t>(i)];
+    }
 
     int side_[3];
     Bounds3f bounds_;
