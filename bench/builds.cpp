@@ -100,6 +100,8 @@ void run(const Options& options) {
 }  // namespace
 }  // namespace packet::bench
 
+// Adding options throws only if they contradict each other, which every run would show.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     packet::bench::Options options;
     CLI::App app("Builds generated scenes with our builders and Embree's, on all threads",

@@ -131,6 +131,8 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace
 }  // namespace packet::bench
 
+// Adding options throws only if they contradict each other, which every run would show.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     packet::bench::Options options;
     CLI::App app("Traces scenes with our kernels and with Embree, on the same rays",

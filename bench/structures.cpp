@@ -110,6 +110,8 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace
 }  // namespace packet::bench
 
+// Adding options throws only if they contradict each other, which every run would show.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     packet::bench::Options options;
     CLI::App app("Builds every structure over scenes and traces them", "packet_structures");

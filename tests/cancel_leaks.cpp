@@ -20,7 +20,7 @@ static void* allocate(std::size_t bytes, std::size_t alignment) {
 
 static void deallocate(void* memory) noexcept {
     if (memory != nullptr) --live_count;
-    std::free(memory);
+    std::free(memory);  // NOLINT(cppcoreguidelines-no-malloc): this is what RAII stands on
 }
 
 void* operator new(std::size_t bytes) { return allocate(bytes, alignof(std::max_align_t)); }
