@@ -178,7 +178,7 @@ std::size_t check_march(const GridSpace& space, const Ray& ray) {
         const float brick_enter = march.meet(brick, 4).enter, enter = march.meet(cell, 1).enter;
         CHECK(brick_enter >= last_brick);
         // Bricks that are entered at once may follow each other's cells.
-        if (brick_enter == last_brick && seen.count({brick[0], brick[1], brick[2]}) != 0) {
+        if (brick_enter == last_brick && seen.contains({brick[0], brick[1], brick[2]})) {
             CHECK(enter >= last_cell);
         }
         seen.insert({brick[0], brick[1], brick[2]});

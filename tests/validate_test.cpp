@@ -53,7 +53,8 @@ struct Child {
 
 /// Places in a sound tree to spoil.
 struct Places {
-    std::size_t inner, leaf, used, unused;
+    std::size_t inner, leaf, used;
+    std::size_t unused = 0;
     Child wide_inner, wide_leaf, wide_absent;
 
     explicit Places(const Tree& tree)
@@ -61,7 +62,6 @@ struct Places {
               tree.nodes, [](const Node& n) { return !n.is_leaf(); }, 2)),
           leaf(find(tree.nodes, [](const Node& n) { return n.count > 1; })),
           used(tree.nodes[leaf].link),
-          unused(0),
           wide_inner(find_child(tree, [](float width, auto n) { return width >= 0 && n == 0; })),
           wide_leaf(find_child(tree, [](float width, auto n) { return width >= 0 && n > 1; })),
           wide_absent(find_child(tree, [](float width, auto) { return width < 0; })) {

@@ -27,6 +27,7 @@ struct CellRange {
 };
 
 /// The only place that computes planes: the build and the walk read the same floats.
+// NOLINTNEXTLINE(bugprone-reserved-identifier,readability-identifier-naming): of implicit copies
 class GridSpace {
 public:
     /// About `cell_count` cells, as near to cubes as whole numbers allow (the cube root rule). An

@@ -25,8 +25,9 @@ PACKET_INLINE bool share_class(const float* const* dir, int count) {
         const F x = F::load(dir[0] + first), y = F::load(dir[1] + first),
                 z = F::load(dir[2] + first);
         const F size_x = abs(x), size_y = abs(y), size_z = abs(z), zero(0.0f);
-        const M traits[kTraits] = {x < zero, y < zero, z < zero,
-                                   (size_y <= size_x) & (size_z <= size_x), size_z <= size_y};
+        const M x_is_longest = (size_y <= size_x) & (size_z <= size_x);
+        const M traits[kTraits] = {x < zero, y < zero, z < zero, x_is_longest,
+                                   x_is_longest | (size_z <= size_y)};
         for (int i = 0; i < kTraits; ++i) {
             const std::uint32_t bits = traits[i].bits() & used;
             some_have |= (bits != 0 ? 1u : 0u) << i;

@@ -18,7 +18,7 @@ struct Mailbox {
     std::int32_t prim_id[kSize];
 
     PACKET_INLINE Mailbox() {
-        for (int i = 0; i < kSize; ++i) prim_id[i] = -1;
+        for (std::int32_t& id : prim_id) id = -1;
     }
     /// Notes the triangle and returns whether it was there.
     PACKET_INLINE bool knows(std::int32_t id) {
