@@ -30,8 +30,7 @@ template <class Isa>
 struct SingleProbe {
     [[gnu::noinline]] static std::uint32_t ray_meets_block(const SingleRay& ray,
                                                            const TriangleBlock& block) {
-        ShearRays<kBlockSize, Isa> shear;
-        ray.broadcast(shear);
+        const auto shear = shear_of<kBlockSize, Isa>(ray);
         return packet::shear<Directions::kShared>(shear, BlockTriangles{block}).may_hit().bits();
     }
 };

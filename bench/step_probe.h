@@ -109,9 +109,9 @@ std::uint64_t ray_meets_wide_boxes(const StepInput& in) {
     for_each_single<Isa>(in, [&](const SingleRay& ray) {
         const WideRay<Isa> wide(ray);
         for (std::size_t i = 0; i < in.wide_node_count; ++i) {
-            const Interval<kWideSize, Isa> boxes = wide.slabs(in.tree.wide_nodes[i]);
-            met += static_cast<std::uint64_t>(
-                count(max(boxes.enter, wide.tnear) <= min(boxes.exit, F(kLargestFloat))));
+            F enter;
+            const std::uint32_t bits = wide.meets(in.tree.wide_nodes[i], F(kLargestFloat), enter);
+            met += static_cast<std::uint64_t>(__builtin_popcount(bits));
         }
     });
     return met;
@@ -122,18 +122,16 @@ std::uint64_t ray_meets_blocks(const StepInput& in) {
     constexpr Directions kShared = Directions::kShared;  // one ray in all lanes
     std::uint64_t met = 0;
     for_each_single<Isa>(in, [&](const SingleRay& ray) {
-        ShearRays<kBlockSize, Isa> shear;
-        ray.broadcast(shear);
+        const auto shear = shear_of<kBlockSize, Isa>(ray);
         for (std::size_t i = 0; i < in.block_count; ++i) {
             const BlockTriangles triangles{in.tree.blocks[i]};
             const auto sheared = packet::shear<kShared>(shear, triangles);
             const Mask<kBlockSize, Isa> candidates = sheared.may_hit();
             if (none(candidates)) continue;
-            HitRays<kBlockSize, Isa> rays;
-            ray.broadcast(rays);
+            const SingleHitRay<kBlockSize, Isa> hit_ray(ray);
             const Float<kBlockSize, Isa> best_t(kLargestFloat);
             met += static_cast<std::uint64_t>(
-                count(decide_hits(sheared, rays, best_t, candidates, triangles).hit));
+                count(decide_hits(sheared, hit_ray, best_t, candidates, triangles).hit));
         }
     });
     return met;

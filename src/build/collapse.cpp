@@ -18,9 +18,10 @@ namespace packet {
 
 namespace {
 
-// Expected cost of a wide node, and of a block of triangles: about as many instructions.
+// Expected cost of a wide node, and of a block of triangles. Instructions would say 1 to 4, but
+// half of the blocks are met for nothing and left early; from 2 to 3 speeds do not differ.
 constexpr float kNodeCost = 1.0f;
-constexpr float kBlockCost = 1.0f;
+constexpr float kBlockCost = 2.0f;
 // Nodes: some hundred microseconds of work.
 constexpr std::size_t kCheckInterval = 4096;
 

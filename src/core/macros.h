@@ -9,3 +9,16 @@
 
 // Misuse of an interface, as opposed to bad data, which throws Error.
 #define PACKET_ASSERT(condition) assert(condition)
+
+namespace packet {
+
+/// The same object, of which the compiler forgets what it knows: it reads anew what it would
+/// otherwise keep in registers that there are not, saved and restored.
+template <class T>
+PACKET_INLINE const T& opaque(const T& object) {
+    const T* address = &object;
+    asm("" : "+r"(address));
+    return *address;
+}
+
+}  // namespace packet

@@ -16,8 +16,8 @@ struct Interval {
 };
 
 /// Rays against triangles' boxes. For each axis the order of its planes follows from dir.
-template <int N, class Isa>
-PACKET_INLINE Interval<N, Isa> slabs(const HitRays<N, Isa>& ray, const Float<N, Isa> (&lower)[3],
+template <class Rays, int N, class Isa>
+PACKET_INLINE Interval<N, Isa> slabs(const Rays& ray, const Float<N, Isa> (&lower)[3],
                                      const Float<N, Isa> (&upper)[3]) {
     Interval<N, Isa> out;
     for (int a = 0; a < 3; ++a) {

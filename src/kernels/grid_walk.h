@@ -20,20 +20,18 @@ struct GridRay {
 
     /// Starts at `from` or later.
     PACKET_INLINE GridRay(const GridView& grid, const SingleRay& ray, float from) {
-        const PreparedLanes& lanes = ray.lanes;
-        const int i = ray.lane;
+        using L = PreparedLanes;
         std::int32_t step = 1;
-        start = lanes.tnear[i] > from ? lanes.tnear[i] : from;
+        start = ray.number(L::kTnear) > from ? ray.number(L::kTnear) : from;
         for (int a = 0; a < 3; ++a) {
             const int count = grid.brick_count[a];
-            const float reciprocal = lanes.reciprocal[a][i];
-            const bool negative = ray.near_side[a] != 0;
+            const bool negative = ray.is_backward(a);
             bricks[a] = {negative ? grid.planes[a] + count * kBrickSide : grid.planes[a],
                          negative ? -kBrickSide : kBrickSide,
                          count,
-                         lanes.org[negative ? 1 : 0][a][i],
-                         lanes.org[negative ? 0 : 1][a][i],
-                         reciprocal};
+                         ray.number((negative ? L::kUpperOrg : L::kLowerOrg) + a),
+                         ray.number((negative ? L::kLowerOrg : L::kUpperOrg) + a),
+                         ray.number(L::kReciprocal + a)};
             first_brick += negative ? (count - 1) * step : 0;
             brick_step[a] = negative ? -step : step;
             flipped |= negative ? 3u << 2 * a : 0u;
@@ -42,8 +40,9 @@ struct GridRay {
             start = enter > start ? enter : start;
         }
         for (int a = 0; a < 3; ++a) {
-            const float way = __builtin_fabsf(lanes.org[0][a][i] + start / lanes.reciprocal[a][i] -
-                                              bricks[a].planes[0]);
+            const float at_start =
+                ray.number(L::kLowerOrg + a) + start / ray.number(L::kReciprocal + a);
+            const float way = __builtin_fabsf(at_start - bricks[a].planes[0]);
             const float last = static_cast<float>(bricks[a].count - 1);
             const float at = way * grid.bricks_per_unit[a];
             guess[a] = static_cast<int>(at < last ? at : last);  // last for NaN, too

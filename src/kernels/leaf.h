@@ -73,17 +73,14 @@ struct SingleLeaf {
     BestHits<1, Isa>& best;
 
     PACKET_INLINE void meet(BlockRange range) const {
-        ShearRays<kBlockSize, Isa> shear;
-        ray.broadcast(shear);
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
             const TriangleBlock& block = tree.blocks[b];
-            const auto sheared = packet::shear<Directions::kShared>(shear, BlockTriangles{block});
+            const auto sheared = shear<Directions::kShared>(shear_of<kBlockSize, Isa>(opaque(ray)),
+                                                            BlockTriangles{block});
             const M candidates = sheared.may_hit();
             if (none(candidates)) continue;
-            HitRays<kBlockSize, Isa> hit_rays;
-            ray.broadcast(hit_rays);
-            take(block,
-                 decide_hits(sheared, hit_rays, F(best.t.r[0]), candidates, BlockTriangles{block}));
+            take(block, decide_hits(sheared, SingleHitRay<kBlockSize, Isa>(ray), F(best.t.r[0]),
+                                    candidates, BlockTriangles{block}));
             if (query == Query::kAny && best.t.r[0] == kNever) return;
         }
     }

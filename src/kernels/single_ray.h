@@ -9,42 +9,66 @@ namespace packet {
 /// Rays are prepared this many at a time.
 inline constexpr int kSingleLanes = 8;
 
-/// What PreparedRays holds, in memory, by lane.
+/// What PreparedRays holds, in memory: a row holds a number of all rays, a column all numbers of a
+/// ray, so these lie at fixed distances from each other.
 struct PreparedLanes {
-    alignas(64) float tnear[kSingleLanes];
-    float inv_dir[3][kSingleLanes], shift[2][3][kSingleLanes];
-    float shear_org[3][kSingleLanes];  ///< in the order of the lane's axes
-    float shear_x[kSingleLanes], shear_y[kSingleLanes], scale_z[kSingleLanes];
-    float org[2][3][kSingleLanes], reciprocal[3][kSingleLanes];
-    std::uint32_t negative[3];     ///< bit i: lane i goes down the axis
-    std::uint32_t z_is_x, z_is_y;  ///< bit i: which is lane i's longest axis
+    enum Number {  // those of which there are three: one an axis
+        kTnear,
+        kInvDir,                   ///< for nodes, as the next two
+        kNearShift = kInvDir + 3,  ///< for the planes that are met first
+        kFarShift = kNearShift + 3,
+        kShearOrg = kFarShift + 3,  ///< in the order of the ray's axes
+        kShearX = kShearOrg + 3,
+        kShearY,
+        kScaleZ,
+        kLowerOrg,  ///< for triangles' boxes, as the next two
+        kUpperOrg = kLowerOrg + 3,
+        kReciprocal = kUpperOrg + 3,
+        kNumbers = kReciprocal + 3
+    };
+    enum Index {
+        kNearPlanes,  ///< where in WideNode::plane those are that are met first
+        kFarPlanes = kNearPlanes + 3,
+        kAxis = kFarPlanes + 3,  ///< those that become x, y, z
+        kIndices = kAxis + 3
+    };
+    alignas(64) float number[kNumbers][kSingleLanes];
+    std::int32_t index[kIndices][kSingleLanes];
 };
 
 template <class Isa>
 PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLanes, Isa>& ray,
                                  PreparedLanes& out) {
     using F = Float<kSingleLanes, Isa>;
+    using I = Int<kSingleLanes, Isa>;
+    using L = PreparedLanes;
     PreparedRays<kSingleLanes, Isa> from;
     prepare_boxes(from, tree, ray);
     prepare_shear(from, ray);
-    from.hit.tnear.store(out.tnear);
     const Float3<kSingleLanes, Isa> shear_org = rotate_axes(from.shear, ray.org);
-    shear_org.x.store(out.shear_org[0]);
-    shear_org.y.store(out.shear_org[1]);
-    shear_org.z.store(out.shear_org[2]);
-    from.shear.shear_x.store(out.shear_x);
-    from.shear.shear_y.store(out.shear_y);
-    from.hit.scale_z.store(out.scale_z);
-    out.z_is_x = from.shear.z_is_x.bits();
-    out.z_is_y = from.shear.z_is_y.bits();
+    from.hit.tnear.store(out.number[L::kTnear]);
+    shear_org.x.store(out.number[L::kShearOrg]);
+    shear_org.y.store(out.number[L::kShearOrg + 1]);
+    shear_org.z.store(out.number[L::kShearOrg + 2]);
+    from.shear.shear_x.store(out.number[L::kShearX]);
+    from.shear.shear_y.store(out.number[L::kShearY]);
+    from.hit.scale_z.store(out.number[L::kScaleZ]);
     for (int a = 0; a < 3; ++a) {
-        from.inv_dir[a].store(out.inv_dir[a]);
-        from.hit.reciprocal[a].store(out.reciprocal[a]);
-        out.negative[a] = (from.hit.reciprocal[a] < F(0.0f)).bits();
-        for (int side = 0; side < 2; ++side) {
-            from.shift[side][a].store(out.shift[side][a]);
-            from.hit.org[side][a].store(out.org[side][a]);
-        }
+        const auto backward = from.hit.reciprocal[a] < F(0.0f);
+        const F &lower = from.shift[0][a], &upper = from.shift[1][a];
+        from.inv_dir[a].store(out.number[L::kInvDir + a]);
+        select(backward, upper, lower).store(out.number[L::kNearShift + a]);
+        select(backward, lower, upper).store(out.number[L::kFarShift + a]);
+        from.hit.org[0][a].store(out.number[L::kLowerOrg + a]);
+        from.hit.org[1][a].store(out.number[L::kUpperOrg + a]);
+        from.hit.reciprocal[a].store(out.number[L::kReciprocal + a]);
+
+        const I lower_planes(a * kWideSize), upper_planes((3 + a) * kWideSize);
+        select(backward, upper_planes, lower_planes).store(out.index[L::kNearPlanes + a]);
+        select(backward, lower_planes, upper_planes).store(out.index[L::kFarPlanes + a]);
+        // x: y z x, y: z x y, z: x y z
+        select(from.shear.z_is_x, I((a + 1) % 3), select(from.shear.z_is_y, I((a + 2) % 3), I(a)))
+            .store(out.index[L::kAxis + a]);
     }
 }
 
@@ -80,40 +104,54 @@ PACKET_INLINE RayLanes<kSingleLanes, Isa> broadcast(const RayLanes<1, Isa>& ray)
     return out;
 }
 
-/// One of the lanes.
-struct SingleRay {
-    const PreparedLanes& lanes;
-    int lane;
-    int near_side[3];  ///< per axis, the plane of a box that is met first
-    int axis[3];       ///< those that become x, y, z
+/// One of the rays.
+class SingleRay {
+public:
+    PACKET_INLINE SingleRay(const PreparedLanes& from, int lane)
+        : numbers_(from.number[0] + lane), indices_(from.index[0] + lane) {}
 
-    PACKET_INLINE SingleRay(const PreparedLanes& from, int i) : lanes(from), lane(i) {
-        for (int a = 0; a < 3; ++a) near_side[a] = static_cast<int>(from.negative[a] >> i & 1u);
-        // x: y z x, y: z x y, z: x y z
-        const int z = (from.z_is_x >> i & 1u) != 0 ? 0 : (from.z_is_y >> i & 1u) != 0 ? 1 : 2;
-        axis[0] = z == 2 ? 0 : z + 1;
-        axis[1] = z == 0 ? 2 : z - 1;
-        axis[2] = z;
+    PACKET_INLINE const float& number(int which) const { return numbers_[which * kSingleLanes]; }
+    PACKET_INLINE std::int32_t index(int which) const { return indices_[which * kSingleLanes]; }
+    PACKET_INLINE bool is_backward(int axis) const {
+        return index(PreparedLanes::kNearPlanes + axis) != axis * kWideSize;
     }
 
-    /// Fills what triangles need, the same in all lanes.
-    template <int N, class Isa>
-    PACKET_INLINE void broadcast(ShearRays<N, Isa>& out) const {
-        for (int a = 0; a < 3; ++a) {
-            out.org[a] = lanes.shear_org[a][lane];
-            out.axis[a] = axis[a];
-        }
-        out.shear_x = lanes.shear_x[lane];
-        out.shear_y = lanes.shear_y[lane];
+private:
+    const float* numbers_;
+    const std::int32_t* indices_;
+};
+
+/// What moves triangles into the ray's space, the same in all lanes.
+template <int N, class Isa>
+PACKET_INLINE ShearRays<N, Isa> shear_of(const SingleRay& ray) {
+    using L = PreparedLanes;
+    ShearRays<N, Isa> out;
+    for (int a = 0; a < 3; ++a) {
+        out.org[a] = ray.number(L::kShearOrg + a);
+        out.axis[a] = ray.index(L::kAxis + a);
     }
-    /// Fills what decides, likewise.
-    template <int N, class Isa>
-    PACKET_INLINE void broadcast(HitRays<N, Isa>& out) const {
-        out.scale_z = lanes.scale_z[lane];
-        out.tnear = lanes.tnear[lane];
+    out.shear_x = ray.number(L::kShearX);
+    out.shear_y = ray.number(L::kShearY);
+    return out;
+}
+
+/// HitRays of one ray: each number is put into all lanes where it is used, and until then takes no
+/// register.
+template <int N, class Isa>
+struct SingleHitRay {
+    struct Broadcast {
+        const float* number;
+        PACKET_INLINE operator Float<N, Isa>() const { return *number; }
+    };
+    Broadcast tnear, scale_z, org[2][3], reciprocal[3];
+
+    PACKET_INLINE explicit SingleHitRay(const SingleRay& ray)
+        : tnear{&ray.number(PreparedLanes::kTnear)}, scale_z{&ray.number(PreparedLanes::kScaleZ)} {
+        using L = PreparedLanes;
         for (int a = 0; a < 3; ++a) {
-            out.reciprocal[a] = lanes.reciprocal[a][lane];
-            for (int side = 0; side < 2; ++side) out.org[side][a] = lanes.org[side][a][lane];
+            org[0][a].number = &ray.number(L::kLowerOrg + a);
+            org[1][a].number = &ray.number(L::kUpperOrg + a);
+            reciprocal[a].number = &ray.number(L::kReciprocal + a);
         }
     }
 };

@@ -7,20 +7,26 @@
 
 namespace packet {
 
+/// The rays of `active` meet the mesh, one by one; `best` has a place for each of the lanes.
 template <Query query, class Isa, class Stats>
-[[gnu::noinline]] void walk_mesh(const TreeView& tree, const SingleRay& ray,
-                                 std::int32_t instance_id, BestHits<1, Isa>& best, Stats& stats) {
-    best.enter_instance(instance_id);
-    if (tree.grid.bricks != nullptr) {
-        walk_grid<query>(tree, ray, kNever, instance_id, best, stats);
-        return;
+[[gnu::noinline]] void walk_mesh(const TreeView& tree, const PreparedLanes& lanes,
+                                 std::uint32_t active, std::int32_t instance_id,
+                                 BestHits<1, Isa>* best, Stats& stats) {
+    for (; active != 0; active &= active - 1) {
+        const int i = __builtin_ctz(active);
+        const SingleRay ray(lanes, i);
+        best[i].enter_instance(instance_id);
+        if (tree.grid.bricks != nullptr) {
+            walk_grid<query>(tree, ray, kNever, instance_id, best[i], stats);
+            continue;
+        }
+        const SingleLeaf<query, Isa> leaf{tree, ray, instance_id, best[i]};
+        walk_wide_tree<query, Isa>(tree, ray, best[i].t.r[0], stats,
+                                   [&](std::uint32_t first, std::uint32_t item_count) {
+                                       stats.triangles(static_cast<int>(item_count));
+                                       leaf.meet(BlockRange{first, item_count});
+                                   });
     }
-    const SingleLeaf<query, Isa> leaf{tree, ray, instance_id, best};
-    walk_wide_tree<query, Isa>(tree, ray, best.t.r[0], stats,
-                               [&](std::uint32_t first, std::uint32_t item_count) {
-                                   stats.triangles(static_cast<int>(item_count));
-                                   leaf.meet(BlockRange{first, item_count});
-                               });
 }
 
 /// The ray meets the instances of a leaf of the top tree.
@@ -34,8 +40,8 @@ PACKET_INLINE void meet_instances(const SceneView& scene, const RayLanes<1, Isa>
         if (instance.tree->is_empty() || none(usable(moved))) continue;
         PreparedLanes lanes;
         prepare_lanes(*instance.tree, broadcast(moved), lanes);
-        walk_mesh<query>(*instance.tree, SingleRay(lanes, 0),
-                         static_cast<std::int32_t>(instance.instance_id), best, stats);
+        walk_mesh<query>(*instance.tree, lanes, 1, static_cast<std::int32_t>(instance.instance_id),
+                         &best, stats);
     }
 }
 
@@ -57,32 +63,30 @@ struct StoredRays {
     }
 };
 
-/// The rays of `active`, which are usable, walk the scene one by one. Calls found(lane, best) with
-/// what each has found.
-template <Query query, class Isa, class Stats, class Found>
+/// The rays of `active`, which are usable, walk the scene one by one; `best` has a place for each
+/// of the lanes.
+template <Query query, class Isa, class Stats>
 PACKET_INLINE void walk_scene_singly(const SceneView& scene,
                                      const RayLanes<kSingleLanes, Isa>& rays, std::uint32_t active,
-                                     Stats& stats, Found&& found) {
+                                     BestHits<1, Isa>* best, Stats& stats) {
     const TreeView& tree = scene.is_single_mesh ? *scene.instances[0].tree : scene.top;
     if (tree.is_empty()) return;
-    const StoredRays stored(rays);
     PreparedLanes lanes;
     prepare_lanes(tree, rays, lanes);
+    if (scene.is_single_mesh) {
+        walk_mesh<query>(tree, lanes, active,
+                         static_cast<std::int32_t>(scene.instances[0].instance_id), best, stats);
+        return;
+    }
+    const StoredRays stored(rays);
     for (; active != 0; active &= active - 1) {
         const int i = __builtin_ctz(active);
-        const SingleRay ray(lanes, i);
-        BestHits<1, Isa> best(stored.tfar[i], Mask<1, Isa>::from_bits(1));
-        if (scene.is_single_mesh) {
-            walk_mesh<query>(tree, ray, static_cast<std::int32_t>(scene.instances[0].instance_id),
-                             best, stats);
-        } else {
-            const RayLanes<1, Isa> world = stored.lane<Isa>(i);
-            walk_wide_tree<query, Isa>(
-                tree, ray, best.t.r[0], stats, [&](std::uint32_t first, std::uint32_t item_count) {
-                    meet_instances<query>(scene, world, first, item_count, best, stats);
-                });
-        }
-        found(i, best);
+        const RayLanes<1, Isa> world = stored.lane<Isa>(i);
+        walk_wide_tree<query, Isa>(tree, SingleRay(lanes, i), best[i].t.r[0], stats,
+                                   [&](std::uint32_t first, std::uint32_t item_count) {
+                                       meet_instances<query>(scene, world, first, item_count,
+                                                             best[i], stats);
+                                   });
     }
 }
 

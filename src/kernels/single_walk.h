@@ -12,100 +12,117 @@
 
 namespace packet {
 
-/// A ray in all 8 lanes, with what the boxes of children need picked out by its octant.
+/// A ray in all 8 lanes, as the boxes of children need it.
 template <class Isa>
-struct WideRay {
+class WideRay {
+public:
     using F = Float<kWideSize, Isa>;
-    F inv_dir[3], near_shift[3], far_shift[3], tnear;
-    int near_side[3];
 
-    PACKET_INLINE explicit WideRay(const SingleRay& ray) : tnear(ray.lanes.tnear[ray.lane]) {
+    PACKET_INLINE explicit WideRay(const SingleRay& ray) : tnear_(ray.number(L::kTnear)) {
         for (int a = 0; a < 3; ++a) {
-            near_side[a] = ray.near_side[a];
-            inv_dir[a] = ray.lanes.inv_dir[a][ray.lane];
-            near_shift[a] = ray.lanes.shift[near_side[a]][a][ray.lane];
-            far_shift[a] = ray.lanes.shift[1 - near_side[a]][a][ray.lane];
+            inv_dir_[a] = ray.number(L::kInvDir + a);
+            near_shift_[a] = ray.number(L::kNearShift + a);
+            far_shift_[a] = ray.number(L::kFarShift + a);
+            near_planes_[a] = ray.index(L::kNearPlanes + a);
+            far_planes_[a] = ray.index(L::kFarPlanes + a);
         }
     }
-    /// Where the ray enters and leaves the children's boxes, by the quick form of box.h.
-    PACKET_INLINE Interval<kWideSize, Isa> slabs(const WideNode& node) const {
-        Interval<kWideSize, Isa> out;
+    /// The children whose boxes the ray meets before `best_t`, and where it enters them, by the
+    /// quick form of box.h.
+    PACKET_INLINE std::uint32_t meets(const WideNode& node, const F& best_t, F& enter) const {
+        const float* planes = node.plane[0][0];
+        F exit;
         for (int a = 0; a < 3; ++a) {
             const F t_near =
-                multiply_subtract(F::load(node.plane[near_side[a]][a]), inv_dir[a], near_shift[a]);
-            const F t_far = multiply_subtract(F::load(node.plane[1 - near_side[a]][a]), inv_dir[a],
-                                              far_shift[a]);
-            out.enter = a == 0 ? t_near : max(out.enter, t_near);
-            out.exit = a == 0 ? t_far : min(out.exit, t_far);
+                multiply_subtract(F::load(planes + near_planes_[a]), inv_dir_[a], near_shift_[a]);
+            const F t_far =
+                multiply_subtract(F::load(planes + far_planes_[a]), inv_dir_[a], far_shift_[a]);
+            enter = a == 0 ? t_near : max(enter, t_near);
+            exit = a == 0 ? t_far : min(exit, t_far);
         }
-        return out;
+        // if (max(enter, tnear) > min(exit, best_t)) it misses; equal must pass, for the tie rule
+        return (max(enter, tnear_) <= min(exit, best_t)).bits();
     }
+
+private:
+    using L = PreparedLanes;
+
+    F inv_dir_[3], near_shift_[3], far_shift_[3], tnear_;
+    std::ptrdiff_t near_planes_[3], far_planes_[3];
 };
 
 /// Subtrees to visit, the nearest on top.
-struct SingleStack {
-    struct Entry {
-        float enter;
-        WideChild child;
-    };
-    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
-    Entry entries[kMaxDepth * (kWideSize - 1) + 1];
-    int depth = 0;
+class SingleStack {
+public:
+    PACKET_INLINE SingleStack() { entries_[0].enter = kNever; }
 
     PACKET_INLINE void push(const WideChild& child, float enter) {
-        entries[depth++] = {enter, child};
-    }
-    /// Pushes below the entries that are nearer, down to `bottom`. Insertion: seldom more than
-    /// three children are met.
-    PACKET_INLINE void insert(const WideChild& child, float enter, int bottom) {
-        int place = depth++;
-        for (; place > bottom && entries[place - 1].enter < enter; --place) {
-            entries[place] = entries[place - 1];
-        }
-        entries[place] = {enter, child};
+        ++top_;
+        top_->child = child;
+        top_->enter = enter;
     }
     /// The nearest subtree that begins before `best_t`; false if there is none.
     PACKET_INLINE bool pop(float best_t, WideChild& out) {
-        while (depth != 0) {
-            const Entry& top = entries[--depth];
-            if (top.enter > best_t) continue;
-            out = top.child;
-            return true;
-        }
-        return false;
+        const Entry* entry = top_;
+        while (entry->enter > best_t) --entry;  // ends at the lowest, which begins before all
+        top_ = const_cast<Entry*>(entry) - 1;
+        out = entry->child;
+        return entry != entries_;
     }
+
+private:
+    struct Entry {
+        WideChild child;
+        float enter;
+        std::uint32_t unused;  // so that an entry moves as one
+    };
+    Entry* top_ = entries_;
+    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind; below them
+    // lies what ends the walk.
+    Entry entries_[kMaxDepth * (kWideSize - 1) + 2];
 };
 
+/// A child by its entry, in a word that is less the nearer it is; the last bits tell which it is.
+PACKET_INLINE std::int32_t child_key(const float (&enter)[kWideSize], int child) {
+    return (__builtin_bit_cast(std::int32_t, enter[child]) & -kWideSize) | child;
+}
+PACKET_INLINE void order(std::int32_t& a, std::int32_t& b) {
+    const std::int32_t less = a < b ? a : b, more = a < b ? b : a;
+    a = less, b = more;
+}
+
 /// Takes one of the children of `bits` (not empty), for closest-hit the nearest, and pushes the
-/// others: for closest-hit in order of entry, for any-hit as they come.
+/// others.
 template <Query query, class Isa>
 PACKET_INLINE WideChild descend(const WideNode& node, const Float<kWideSize, Isa>& enters,
                                 std::uint32_t bits, SingleStack& stack) {
+    float enter[kWideSize];
+    const auto push = [&](std::int32_t key) {
+        const int child = key & (kWideSize - 1);
+        stack.push(node.child[child], enter[child]);
+    };
     const int first = __builtin_ctz(bits);
     bits &= bits - 1;
     if (bits == 0) return node.child[first];
-    float enter[kWideSize];
     enters.store(enter);
-    const int second = __builtin_ctz(bits);
-    bits &= bits - 1;
-    const bool swapped = query == Query::kClosest && enter[second] < enter[first];
-    const int near = swapped ? second : first, far = swapped ? first : second;
-    if (bits == 0) {
-        stack.push(node.child[far], enter[far]);
-        return node.child[near];
-    }
-    const int bottom = stack.depth;
-    stack.push(node.child[far], enter[far]);
-    stack.push(node.child[near], enter[near]);
-    for (; bits != 0; bits &= bits - 1) {
-        const int child = __builtin_ctz(bits);
-        if constexpr (query == Query::kClosest) {
-            stack.insert(node.child[child], enter[child], bottom);
-        } else {
-            stack.push(node.child[child], enter[child]);
+    if constexpr (query == Query::kAny) {
+        int last = first;
+        for (; bits != 0; bits &= bits - 1) {
+            push(last);
+            last = __builtin_ctz(bits);
         }
+        return node.child[last];
     }
-    return stack.entries[--stack.depth].child;
+    std::int32_t near = child_key(enter, first), far = child_key(enter, __builtin_ctz(bits));
+    order(near, far);
+    for (bits &= bits - 1; bits != 0; bits &= bits - 1) {
+        std::int32_t next = child_key(enter, __builtin_ctz(bits));
+        order(far, next);
+        order(near, far);
+        push(next);
+    }
+    push(far);
+    return node.child[near & (kWideSize - 1)];
 }
 
 /// Calls leaf(first, count) for each leaf whose box the ray meets before `best_t`, which leaf may
@@ -114,27 +131,28 @@ template <Query query, class Isa, class Stats, class Leaf>
 PACKET_INLINE void walk_wide_tree(const TreeView& tree, const SingleRay& ray, const float& best_t,
                                   Stats& stats, Leaf&& leaf) {
     using F = Float<kWideSize, Isa>;
-    const WideRay<Isa> wide(ray);
     SingleStack stack;
     WideChild next = {0, 0};
     for (;;) {
-        if (!next.is_leaf()) {
+        // Read anew after leaves, which need all registers.
+        const WideRay<Isa> wide(opaque(ray));
+        const F farthest(best_t);
+        while (!next.is_leaf()) {
             const WideNode& node = tree.wide_nodes[next.link];
             stats.visit(1, 1);
-            const Interval<kWideSize, Isa> boxes = wide.slabs(node);
-            // if (max(enter, tnear) > min(exit, best_t)) the ray misses; equal must pass, for the
-            // tie rule
-            const std::uint32_t bits =
-                (max(boxes.enter, wide.tnear) <= min(boxes.exit, F(best_t))).bits();
+            F enter;
+            const std::uint32_t bits = wide.meets(node, farthest, enter);
             if (bits != 0) {
-                next = descend<query>(node, boxes.enter, bits, stack);
-                continue;
+                next = descend<query>(node, enter, bits, stack);
+            } else if (!stack.pop(best_t, next)) {
+                return;
             }
-        } else {
+        }
+        do {
             leaf(next.link, next.count);
             if (query == Query::kAny && best_t == kNever) return;
-        }
-        if (!stack.pop(best_t, next)) return;
+            if (!stack.pop(best_t, next)) return;
+        } while (next.is_leaf());
     }
 }
 

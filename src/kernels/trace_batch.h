@@ -87,11 +87,13 @@ template <Query query, class Isa, int kCount, class Stats>
 PACKET_INLINE void trace_singly(const SceneView& scene, const RayColumns& rays, std::uint32_t asked,
                                 Stats& stats, HitArrays<kCount, Isa>& out, int first) {
     const LoadedRays<kSingleLanes, Isa> loaded(rays.from(first), asked);
-    store_hits(BestHits<kSingleLanes, Isa>(loaded.ray.tfar, loaded.active), out, first);  // misses
-    if (none(loaded.active)) return;
-    walk_scene_singly<query>(
-        scene, loaded.ray, loaded.active.bits(), stats,
-        [&](int lane, const BestHits<1, Isa>& best) { store_hits(best, out, first + lane); });
+    const std::uint32_t active = loaded.active.bits();
+    float tfar[kSingleLanes];
+    loaded.ray.tfar.store(tfar);
+    BestHits<1, Isa> best[kSingleLanes];
+    for (int i = 0; i < kSingleLanes; ++i) best[i].reset(tfar[i], Mask<1, Isa>::from_bits(1));
+    if (active != 0) walk_scene_singly<query>(scene, loaded.ray, active, best, stats);
+    for (int i = 0; i < kSingleLanes; ++i) store_hits(best[i], out, first + i);
 }
 
 /// The lanes of N that are among the first `count`, counted from lane `first`.

@@ -142,9 +142,8 @@ PACKET_INLINE Float3<N, Isa> to_ray_space(const ShearRays<N, Isa>& ray, const Tr
 }
 
 /// Where the rays enter and leave the triangles' own boxes.
-template <int N, class Isa, class Triangles>
-PACKET_INLINE Interval<N, Isa> triangle_box(const HitRays<N, Isa>& ray,
-                                            const Triangles& triangles) {
+template <int N, class Isa, class Rays, class Triangles>
+PACKET_INLINE Interval<N, Isa> triangle_box(const Rays& ray, const Triangles& triangles) {
     using F = Float<N, Isa>;
     F lower[3], upper[3];
     for (int a = 0; a < 3; ++a) {
@@ -206,10 +205,10 @@ PACKET_INLINE Mask<N, Isa> decide_zeros(const Float3<N, Isa> (&p)[3], Mask<N, Is
 
 /// Which of `candidates`, lanes that may hit, do: the ray passes inside or on the edges, the
 /// triangle's box is met, and t, moved into that box, lies in [tnear, best_t].
-template <int N, class Isa, class Triangles>
+template <int N, class Isa, class Rays, class Triangles>
 PACKET_INLINE TriangleHits<N, Isa> decide_hits(const ShearedTriangles<N, Isa>& sheared,
-                                               const HitRays<N, Isa>& ray,
-                                               const Float<N, Isa>& best_t, Mask<N, Isa> candidates,
+                                               const Rays& ray, const Float<N, Isa>& best_t,
+                                               Mask<N, Isa> candidates,
                                                const Triangles& triangles) {
     using F = Float<N, Isa>;
     const F zero(0.0f);
@@ -228,13 +227,13 @@ PACKET_INLINE TriangleHits<N, Isa> decide_hits(const ShearedTriangles<N, Isa>& s
     const Mask<N, Isa> ill = out.hit & is_ill_conditioned(p, det);
     if (any(ill)) [[unlikely]] {
         StoredHits<N> hits;
-        ray.scale_z.store(hits.scale_z);
+        F(ray.scale_z).store(hits.scale_z);
         out.t.store(hits.t), out.u.store(hits.u), out.v.store(hits.v);
         refine_hits<N, Isa>(StoredCorners<N>(p), ill.bits(), hits);
         out.t = F::load(hits.t), out.u = F::load(hits.u), out.v = F::load(hits.v);
     }
 
-    const Interval<N, Isa> box = triangle_box(ray, triangles);
+    const Interval<N, Isa> box = triangle_box<N, Isa>(ray, triangles);
     // max and min yield their second operand for NaN: a NaN stays one and fails the comparisons
     const F t = min(box.exit, max(box.enter, out.t)) + zero;  // + 0 makes -0 a 0
     out.hit = out.hit & (box.enter <= box.exit) & (ray.tnear <= t) & (t <= best_t);
