@@ -13,7 +13,7 @@
 
 namespace packet {
 
-/// Rays of a stream. Sets of them are words of 64 bits; 32 rays gained up to a tenth less.
+/// Rays of a stream. Sets of them are words of 64 bits; 32 rays were up to a tenth slower.
 inline constexpr int kStreamRays = 64;
 using RaySet = std::uint64_t;
 
@@ -184,8 +184,8 @@ private:
         push(node, all & ~((found[0] | found[1]) == I(0)).bits(), found, first_enter);
     }
 
-    /// Pushes the children of `bits`, for closest-hit the one that is entered first last. (Any-hit
-    /// takes them as they come: to sort them by the number of rays changed nothing.)
+    /// Pushes the children of `bits`, for closest-hit the one that is entered first last. Any-hit
+    /// takes them as they come.
     PACKET_INLINE void push(const WideNode& node, std::uint32_t bits, const I (&found)[2],
                             const F& first_enter) {
         if (bits == 0) return;

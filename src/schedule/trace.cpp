@@ -29,7 +29,7 @@ constexpr std::array kModeNames = {
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
 constexpr std::size_t kRaysPerTask = 512;
-// Fewer, of 24 classes, make streams of few rays.
+// Fewer, of 24 classes, make streams of few rays: docs/benchmarking.md#streams.
 constexpr std::size_t kLeastRaysForStreams = 1024;
 // Rays that look coherent go by tiles, which seldom lose. For the others, if there are enough,
 // auto tries packets of 16 beside single rays: short rays gain by them. Packets of 8 never won by
