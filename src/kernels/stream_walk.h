@@ -1,8 +1,8 @@
 // Walks the 8-wide form of a tree with a stream: up to 64 rays of one class, not close enough to
 // share a beam or a packet. They share the stack: an entry is a subtree and the set of rays that
 // meet it, so a node is fetched once for all of them, and its planes stay in registers while ray
-// after ray meets its 8 children, without a branch. Single rays mispredict about one branch a node;
-// a stream one or two for all rays of a node.
+// after ray meets its 8 children, without a branch. Single rays mispredict about two branches a
+// node, rays of a stream less than one.
 //
 // Barringer, Akenine-Moller. Dynamic ray stream traversal. TOG 2014. Fuetterling, Lojewski,
 // Pfreundt, Ebert. Efficient ray tracing kernels for modern CPU architectures. JCGT 2015.
