@@ -14,7 +14,7 @@ import matplotlib
 matplotlib.use("Agg")  # no display
 import matplotlib.pyplot as plt
 
-MODES = ["single", "packet8", "packet16", "tile", "auto"]
+MODES = ["single", "packet8", "packet16", "tile", "stream", "auto"]
 ISAS = ["scalar", "sse42", "avx2", "avx512"]
 SWEEPS = [
     ("angle", "angle to the group's axis, degrees"),
@@ -22,7 +22,7 @@ SWEEPS = [
     ("order", "order of a camera's pixels in memory"),
     ("bounce", "bounces"),
 ]
-COLORS = dict(zip(MODES + ISAS, ["C0", "C1", "C2", "C3", "black", "C7", "C0", "C1", "C2"]))
+COLORS = dict(zip(MODES + ISAS, ["C0", "C1", "C2", "C3", "C4", "black", "C7", "C0", "C1", "C2"]))
 
 
 def read(path):

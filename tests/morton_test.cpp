@@ -3,10 +3,10 @@
 #include "random.h"
 
 #include "build/bvh_morton.h"
-#include "build/morton.h"
-#include "build/radix_sort.h"
 #include "build/radix_tree.h"
 #include "build/tree.h"
+#include "core/morton.h"
+#include "schedule/radix_sort.h"
 
 #include <packet/error.h>
 

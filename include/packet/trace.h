@@ -21,7 +21,8 @@ enum class Mode : std::uint8_t {
     kSingle,    ///< one ray at a time
     kPacket8,   ///< 8 rays share one stack
     kPacket16,  ///< 16 rays share one stack
-    kTile       ///< up to 128 rays share one stack and a beam around them, as far as they cohere
+    kTile,      ///< up to 128 rays share one stack and a beam around them, as far as they cohere
+    kStream     ///< incoherent rays by the thousand: sorted, then up to 64 share one stack
 };
 
 struct ModeName {

@@ -6,10 +6,10 @@
 // Karras. Maximizing parallelism in the construction of BVHs, octrees, and k-d trees. HPG 2012.
 #include "build/bvh_morton.h"
 
-#include "build/morton.h"
-#include "build/radix_sort.h"
 #include "build/radix_tree.h"
 #include "build/split.h"
+#include "core/morton.h"
+#include "schedule/radix_sort.h"
 
 #include <algorithm>
 #include <atomic>

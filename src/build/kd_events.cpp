@@ -1,6 +1,6 @@
 #include "build/kd_events.h"
 
-#include "build/radix_sort.h"
+#include "schedule/radix_sort.h"
 
 #include <algorithm>
 #include <bit>

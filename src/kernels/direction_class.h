@@ -2,11 +2,11 @@
 // of a tile are of a few classes, as shadow rays to a light between them are, they are sorted.
 #pragma once
 
+#include "core/direction_class.h"
 #include "kernels/lanes.h"
 
 namespace packet {
 
-inline constexpr int kDirectionClasses = 24;
 /// Rays of more classes than this are bounced ones, whose beams would be wide: it does not pay to
 /// sort them.
 inline constexpr int kMostClasses = 4;
@@ -35,13 +35,6 @@ PACKET_INLINE bool share_class(const float* const* dir, int count) {
         }
     }
     return (some_have & some_lack) == 0;
-}
-
-PACKET_INLINE int direction_class(float x, float y, float z) {
-    const float size_x = __builtin_fabsf(x), size_y = __builtin_fabsf(y),
-                size_z = __builtin_fabsf(z);
-    const int octant = (x < 0.0f ? 1 : 0) + (y < 0.0f ? 2 : 0) + (z < 0.0f ? 4 : 0);
-    return octant + 8 * (size_x >= size_y && size_x >= size_z ? 0 : size_y >= size_z ? 1 : 2);
 }
 
 /// Rays sorted by class: those of class c are ray[begin[c]] to ray[begin[c + 1]], in order.

@@ -1,4 +1,4 @@
-#include "kernels/trace_batch.h"
+#include "kernels/make_kernel_table.h"
 
 namespace packet {
 

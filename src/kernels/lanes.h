@@ -168,6 +168,11 @@ struct Int : LaneValues<Int<N, Isa>, std::int32_t, N, Isa> {
     PACKET_INLINE Int(std::int32_t a) {
         for (int i = 0; i < kCount; ++i) r[i] = Reg::broadcast(a);
     }
+
+    PACKET_INLINE friend Int operator|(Int a, const Int& b) {
+        for (int i = 0; i < kCount; ++i) a.r[i] = Reg::either(a.r[i], b.r[i]);
+        return a;
+    }
 };
 
 /// Lanes that take several registers, one register of them at a time: what keeps many values alive

@@ -85,7 +85,6 @@ struct SingleLeaf {
         }
     }
 
-private:
     /// Keeps the nearest.
     PACKET_INLINE void take(const TriangleBlock& block,
                             const TriangleHits<kBlockSize, Isa>& hits) const {

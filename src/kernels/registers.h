@@ -51,6 +51,7 @@ struct ScalarRegister {
     PACKET_INLINE static M both(M a, M b) { return a && b; }
     PACKET_INLINE static M either(M a, M b) { return a || b; }
     PACKET_INLINE static M invert(M a) { return !a; }
+    PACKET_INLINE static I either(I a, I b) { return a | b; }
     template <class T>
     PACKET_INLINE static T select(M m, T a, T b) {
         return m ? a : b;
@@ -114,6 +115,7 @@ struct XsimdRegister {
     PACKET_INLINE static M both(M a, M b) { return a & b; }
     PACKET_INLINE static M either(M a, M b) { return a | b; }
     PACKET_INLINE static M invert(M a) { return ~a; }
+    PACKET_INLINE static I either(I a, I b) { return a | b; }
     PACKET_INLINE static F select(M m, F a, F b) { return xsimd::select(m, a, b); }
     PACKET_INLINE static I select(M m, I a, I b) { return xsimd::select(recast(m), a, b); }
     PACKET_INLINE static std::uint32_t bits(M m) { return mask_bits(m.data); }

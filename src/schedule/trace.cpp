@@ -5,6 +5,7 @@
 #include "schedule/auto_mode.h"
 #include "schedule/parallel.h"
 #include "schedule/pixel_order.h"
+#include "schedule/stream_order.h"
 
 #include <packet/error.h>
 #include <packet/trace.h>
@@ -12,7 +13,9 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <memory>
 #include <mutex>
+#include <utility>
 
 namespace packet {
 
@@ -21,11 +24,13 @@ namespace {
 constexpr std::array kModeNames = {
     ModeName{Mode::kAuto, "auto"},       ModeName{Mode::kSingle, "single"},
     ModeName{Mode::kPacket8, "packet8"}, ModeName{Mode::kPacket16, "packet16"},
-    ModeName{Mode::kTile, "tile"},
+    ModeName{Mode::kTile, "tile"},       ModeName{Mode::kStream, "stream"},
 };
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
 constexpr std::size_t kRaysPerTask = 512;
+// Fewer, of 24 classes, make streams of few rays: docs/benchmarking.md#streams.
+constexpr std::size_t kLeastRaysForStreams = 1024;
 // Rays that look coherent go by tiles, which seldom lose. For the others, if there are enough,
 // auto tries packets of 16 beside single rays: short rays gain by them. Packets of 8 never won by
 // much. It does so this many times, each time on neighbouring tasks,
@@ -38,42 +43,82 @@ KernelTable::Kernel kernel_of(Mode mode) {
         case Mode::kPacket8: return KernelTable::kPacket8;
         case Mode::kPacket16: return KernelTable::kPacket16;
         case Mode::kTile: return KernelTable::kTile;
+        case Mode::kStream: return KernelTable::kStream;
         case Mode::kAuto:
         case Mode::kSingle: break;
     }
     return KernelTable::kSingle;
 }
 
+/// Rays of a task of streams. The more are sorted together, the more come together at a node; but
+/// they are to stay in the second level's cache, and several threads are to have several tasks.
+std::size_t rays_per_stream_task(std::size_t rays, int threads) {
+    constexpr std::size_t kMost = 32768;
+    static_assert(kMost <= StreamOrder::kMostRays);
+    constexpr std::size_t kTasksPerThread = 8;
+    if (threads == 1) return kMost;
+    return std::clamp(rays / (kTasksPerThread * static_cast<std::size_t>(threads)),
+                      kLeastRaysForStreams, kMost);
+}
+
 /// Rays cut into tasks: an image's into square tiles, others into runs.
 class Tasks {
 public:
     Tasks(std::span<const Ray> rays, int width) : rays_(rays), image_(rays.size(), width) {}
+    /// For streams: runs that are sorted, within the scene's box `world`.
+    Tasks(std::span<const Ray> rays, const Bounds3f& world, int threads)
+        : rays_(rays),
+          image_(rays.size(), 0),
+          run_length_(rays_per_stream_task(rays.size(), threads)),
+          world_(&world) {}
 
     [[nodiscard]] std::size_t count() const {
         return image_.is_image() ? image_.tile_count()
-                                 : (rays_.size() + kRaysPerTask - 1) / kRaysPerTask;
+                                 : (rays_.size() + run_length_ - 1) / run_length_;
     }
     /// Runs a kernel on the rays of a task. `batch` says where results go, for all rays.
     void run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
-        PixelOrder::Indices order;
-        std::size_t first = task * kRaysPerTask;
-        batch.count = std::min(kRaysPerTask, rays_.size() - std::min(first, rays_.size()));
+        PixelOrder::Indices pixels;
+        std::unique_ptr<StreamOrder> sorted;
+        std::size_t first = task * run_length_;
+        batch.count = std::min(run_length_, rays_.size() - std::min(first, rays_.size()));
         if (image_.is_image()) {
             first = image_.first_ray(task);
-            batch.count = image_.fill(task, order);
-            batch.order = order.data();
+            batch.count = image_.fill(task, pixels);
+            batch.order = pixels.data();
+        } else if (world_ != nullptr) {
+            sorted = orders_.take();
+            batch.order = sorted->sort(rays_.subspan(first, batch.count), *world_).data();
         }
         batch.rays = rays_.data() + first;
         if (batch.hits != nullptr) batch.hits += first;
         if (batch.occluded != nullptr) batch.occluded += first;
         if (batch.stats != nullptr) batch.stats->rays += batch.count;
         kernel(batch);
+        if (sorted != nullptr) orders_.give_back(std::move(sorted));
     }
 
 private:
     std::span<const Ray> rays_;
     PixelOrder image_;
+    std::size_t run_length_ = kRaysPerTask;
+    const Bounds3f* world_ = nullptr;
+    mutable StreamOrders orders_;
 };
+
+/// Streams walk one tree, in the rays' own space.
+bool has_one_tree(const SceneView& scene) {
+    return scene.is_single_mesh && scene.instances[0].tree->is_tree();
+}
+
+/// What the rays are traced by: as asked for, or as they suggest.
+Mode resolve_mode(const SceneAccel& scene, std::span<const Ray> rays, Mode asked) {
+    if (asked == Mode::kStream && !has_one_tree(scene.view)) return Mode::kSingle;
+    if (asked != Mode::kAuto) return asked;
+    const Mode mode = choose_mode(rays, scene.top.bounds);
+    const bool are_many = rays.size() >= kLeastRaysForStreams;
+    return mode == Mode::kSingle && are_many && has_one_tree(scene.view) ? Mode::kStream : mode;
+}
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
@@ -82,17 +127,17 @@ public:
 
     SpanTrace(const Scene& scene, std::span<const Ray> rays, const TraceOptions& options)
         : scene_(scene.accel()),
-          tasks_(rays, options.width),
           options_(options),
-          parallel_(options.threads) {
+          parallel_(options.threads),
+          mode_(resolve_mode(scene_, rays, options.mode)),
+          tasks_(mode_ == Mode::kStream ? Tasks(rays, scene_.top.bounds, parallel_.threads())
+                                        : Tasks(rays, options.width)),
+          tries_(options.mode == Mode::kAuto && mode_ == Mode::kSingle &&
+                 tasks_.count() >= kLeastTasksForTrial) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
                                                   "; it must be 0 (no image) or more");
         }
-        const bool is_auto = options.mode == Mode::kAuto;
-        const Mode mode = is_auto ? choose_mode(rays, scene_.top.bounds) : options.mode;
-        kernel_ = kernel_of(mode);
-        tries_ = is_auto && mode == Mode::kSingle && tasks_.count() >= kLeastTasksForTrial;
     }
 
     void run(const Kernels& kernels, Hit* hits, std::uint8_t* occluded) const {
@@ -101,7 +146,7 @@ public:
             options_.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
         const auto kernel = [&](KernelTable::Kernel which) { return kernels[which][counting]; };
         parallel_.run([&] {
-            const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : kernel_;
+            const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : kernel_of(mode_);
             parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
                 if (!is_trial(task)) run_task(task, kernel(best), batch);
             });
@@ -130,13 +175,13 @@ private:
             // Who comes first finds the scene out of the cache: they take turns.
             if (pair % 2 == 0) {
                 const auto packets = time(0, KernelTable::kPacket16);
-                won_by_packets += packets < time(1, kernel_);
+                won_by_packets += packets < time(1, KernelTable::kSingle);
             } else {
-                const auto other = time(0, kernel_);
+                const auto other = time(0, KernelTable::kSingle);
                 won_by_packets += time(1, KernelTable::kPacket16) < other;
             }
         }
-        return 2 * won_by_packets > kTrialPairs ? KernelTable::kPacket16 : kernel_;
+        return 2 * won_by_packets > kTrialPairs ? KernelTable::kPacket16 : KernelTable::kSingle;
     }
 
     void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
@@ -152,10 +197,10 @@ private:
     }
 
     const SceneAccel& scene_;
-    Tasks tasks_;
     const TraceOptions& options_;
     Parallel parallel_;
-    KernelTable::Kernel kernel_;
+    Mode mode_;
+    Tasks tasks_;
     bool tries_;  ///< whether to find the kernel by trying
     mutable std::mutex stats_mutex_;
 };

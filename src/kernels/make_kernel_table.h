@@ -1,0 +1,37 @@
+// Fills the table of kernels for one instruction set.
+#pragma once
+
+#include "kernels/kernel_table.h"
+#include "kernels/stream_batch.h"
+#include "kernels/trace_batch.h"
+#include "kernels/triangle_box_axes.h"
+#include "kernels/triangle_box_clip.h"
+
+namespace packet {
+
+/// All kernels of an instruction set. Each isa_*.cpp fills one.
+template <class Isa>
+constexpr KernelTable make_kernel_table() {
+    KernelTable table = {};
+    const auto fill = [&]<Query query, class Stats>(auto& kernels, KernelTable::Counting counting) {
+        kernels[KernelTable::kSingle][counting] = trace_batch_singly<query, Isa, Stats>;
+        kernels[KernelTable::kPacket8][counting] = trace_batch_by_packets<query, 8, Isa, Stats>;
+        kernels[KernelTable::kPacket16][counting] = trace_batch_by_packets<query, 16, Isa, Stats>;
+        kernels[KernelTable::kStream][counting] = trace_batch_by_streams<query, Isa, Stats>;
+        kernels[KernelTable::kTile][counting] = trace_batch_by_tiles<query, Isa, Stats>;
+    };
+    using KT = KernelTable;
+    fill.template operator()<Query::kClosest, NoCounters>(table.closest, KT::kNotCounting);
+    fill.template operator()<Query::kClosest, Counters>(table.closest, KT::kCounting);
+    fill.template operator()<Query::kAny, NoCounters>(table.any, KT::kNotCounting);
+    fill.template operator()<Query::kAny, Counters>(table.any, KT::kCounting);
+    table.closest8 = closest_packet<8, Isa>;
+    table.closest16 = closest_packet<16, Isa>;
+    table.any8 = any_packet<8, Isa>;
+    table.any16 = any_packet<16, Isa>;
+    table.overlap_axes8 = overlap_axes<8, Isa>;
+    table.overlap_clip8 = overlap_clip<8, Isa>;
+    return table;
+}
+
+}  // namespace packet

@@ -1,0 +1,76 @@
+// Traces a batch in which rays of one class follow each other: each run of them, of 64 at most, is
+// a stream. src/schedule/stream_order.h sorts them so. Any order is right, but slow.
+#pragma once
+
+#include "core/direction_class.h"
+#include "kernels/stream_walk.h"
+#include "kernels/trace_batch.h"
+
+namespace packet {
+
+template <Query query, class Isa, class Stats>
+class StreamBatch {
+public:
+    PACKET_INLINE StreamBatch(const TraceBatch& batch, const InstanceView& instance)
+        : batch_(batch),
+          tree_(*instance.tree),
+          instance_id_(static_cast<std::int32_t>(instance.instance_id)),
+          stats_(batch.stats),
+          walk_(tree_, instance_id_, stats_) {}
+
+    PACKET_INLINE void trace() {
+        for (std::size_t begin = 0; begin < batch_.count;) {
+            const std::size_t left = batch_.count - begin;
+            const int most = left < kStreamRays ? static_cast<int>(left) : kStreamRays;
+            const RayColumns columns = gather_rays(batch_, begin, most, gathered_);
+            const int count = run_length(columns.component + 4, most);
+            trace_stream(columns, begin, count);
+            begin += static_cast<std::size_t>(count);
+        }
+    }
+
+private:
+    /// The rays from the first on that are of its class.
+    PACKET_INLINE static int run_length(const float* const* dir, int most) {
+        const auto class_of = [&](int i) {
+            return direction_class(dir[0][i], dir[1][i], dir[2][i]);
+        };
+        const int first_class = class_of(0);
+        int count = 1;
+        while (count < most && class_of(count) == first_class) ++count;
+        return count;
+    }
+    PACKET_INLINE void trace_stream(const RayColumns& columns, std::size_t begin, int count) {
+        rays_.active = 0;
+        for (int first = 0; first < count; first += kSingleLanes) {
+            const LoadedRays<kSingleLanes, Isa> loaded(columns.from(first),
+                                                       lanes_below<kSingleLanes>(count, first));
+            rays_.load(tree_, loaded.ray, loaded.active.bits(), first, instance_id_);
+        }
+        walk_.run(rays_);
+        for (int i = 0; i < count; ++i) store_hits(rays_.best[i], hits_, i);
+        scatter_hits<query>(batch_, begin, count, hits_);
+    }
+
+    const TraceBatch& batch_;
+    const TreeView& tree_;
+    std::int32_t instance_id_;
+    Stats stats_;
+    StreamRays<Isa> rays_;
+    StreamWalk<query, Isa, Stats> walk_;
+    RayArrays<kStreamRays, Isa> gathered_ = {};
+    HitArrays<kStreamRays, Isa> hits_;
+};
+
+/// A scene that is one tree; others go ray by ray.
+template <Query query, class Isa, class Stats>
+void trace_batch_by_streams(const TraceBatch& batch) noexcept {
+    const SceneView& scene = *batch.scene;
+    if (scene.is_single_mesh && scene.instances[0].tree->is_tree()) {
+        StreamBatch<query, Isa, Stats>(batch, scene.instances[0]).trace();
+    } else {
+        trace_batch_singly<query, Isa, Stats>(batch);
+    }
+}
+
+}  // namespace packet

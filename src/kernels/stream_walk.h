@@ -1,0 +1,257 @@
+// Walks the 8-wide form of a tree with a stream: up to 64 rays of one class, not close enough to
+// share a beam or a packet. They share the stack: an entry is a subtree and the set of rays that
+// meet it, so a node is fetched once for all of them, and its planes stay in registers while ray
+// after ray meets its 8 children, without a branch. Single rays mispredict about two branches a
+// node, rays of a stream less than one.
+//
+// Barringer, Akenine-Moller. Dynamic ray stream traversal. TOG 2014. Fuetterling, Lojewski,
+// Pfreundt, Ebert. Efficient ray tracing kernels for modern CPU architectures. JCGT 2015.
+#pragma once
+
+#include "kernels/leaf.h"
+#include "kernels/transpose.h"
+
+namespace packet {
+
+/// Rays of a stream. Sets of them are words of 64 bits; 32 rays were up to a tenth slower.
+inline constexpr int kStreamRays = 64;
+using RaySet = std::uint64_t;
+
+/// The bits of rays, as sets of them are kept while rays meet a node: for each child of it the
+/// lower halves of the sets of those that meet it, and the upper halves.
+struct RayBits {
+    std::int32_t half[kStreamRays][2];
+
+    PACKET_INLINE RayBits() {
+        for (int r = 0; r < kStreamRays; ++r) {
+            half[r][r / 32] = static_cast<std::int32_t>(1u << r % 32);
+            half[r][1 - r / 32] = 0;
+        }
+    }
+};
+
+/// What a ray needs at nodes and to filter triangles: one line of the cache. Planes are numbered in
+/// the order in which the stream's rays meet them, axes in that of its triangle test.
+struct alignas(64) StreamRay {
+    float inv_dir[3], near_shift[3], far_shift[3], tnear;
+    float best_t;
+    float shear_org[3], shear_x, shear_y;
+};
+static_assert(sizeof(StreamRay) == 2 * sizeof(Floats8));
+
+/// The rays of a stream, and what they have found.
+template <class Isa>
+struct StreamRays {
+    StreamRay ray[kStreamRays];
+    BestHits<1, Isa> best[kStreamRays];
+    PreparedLanes lanes[kStreamRays / kSingleLanes];
+    int near_side[3] = {0, 0, 0}, axis[3] = {0, 1, 2};  ///< of all
+    RaySet active = 0;
+
+    /// Rays `first` to `first + 8`, of which `used` are usable and of the stream's class.
+    PACKET_INLINE void load(const TreeView& tree, const RayLanes<kSingleLanes, Isa>& rays,
+                            std::uint32_t used, int first, std::int32_t instance_id) {
+        PreparedLanes& from = lanes[first / kSingleLanes];
+        prepare_lanes(tree, rays, from);
+        if (used != 0) {
+            const SingleRay any_ray(from, __builtin_ctz(used));
+            for (int a = 0; a < 3; ++a) {
+                near_side[a] = any_ray.is_backward(a) ? 1 : 0;
+                axis[a] = any_ray.index(PreparedLanes::kAxis + a);
+            }
+        }
+        active |= RaySet{used} << first;
+        const BestHits<kSingleLanes, Isa> none_yet(rays.tfar,
+                                                   Mask<kSingleLanes, Isa>::from_bits(used));
+        float best_t[kSingleLanes];
+        none_yet.t.store(best_t);
+        for (int i = 0; i < kSingleLanes; ++i) {
+            best[first + i].reset(best_t[i], Mask<1, Isa>::from_bits(used >> i & 1u));
+            best[first + i].enter_instance(instance_id);
+        }
+        fill(from, best_t, ray + first);
+    }
+
+    PACKET_INLINE SingleRay single(int r) const {
+        return SingleRay(lanes[r / kSingleLanes], r % kSingleLanes);
+    }
+
+private:
+    /// Columns of eight rays become their rows, in two halves.
+    PACKET_INLINE static void fill(const PreparedLanes& from, const float* best_t, StreamRay* out) {
+        using L = PreparedLanes;
+        const auto row = [&](int number) { return from.number[number]; };
+        const float* const columns[2][8] = {
+            {row(L::kInvDir), row(L::kInvDir + 1), row(L::kInvDir + 2), row(L::kNearShift),
+             row(L::kNearShift + 1), row(L::kNearShift + 2), row(L::kFarShift),
+             row(L::kFarShift + 1)},
+            {row(L::kFarShift + 2), row(L::kTnear), best_t, row(L::kShearOrg),
+             row(L::kShearOrg + 1), row(L::kShearOrg + 2), row(L::kShearX), row(L::kShearY)}};
+        for (int half = 0; half < 2; ++half) {
+            Floats8 rows[8];
+            for (int i = 0; i < 8; ++i) rows[i] = *as_row(columns[half][i]);
+            transpose(rows);
+            for (int i = 0; i < 8; ++i) *(as_row(out + i) + half) = rows[i];
+        }
+    }
+};
+
+/// The lines of what is visited later are fetched when it is pushed, since scenes seldom fit into
+/// the second level's cache.
+PACKET_INLINE void prefetch(const TreeView& tree, const WideChild& child) {
+    const void* const at = child.is_leaf()
+                               ? static_cast<const void*>(tree.blocks + child.link / kBlockSize)
+                               : tree.wide_nodes + child.link;
+    constexpr int kLines = static_cast<int>(sizeof(WideNode)) / 64;
+    for (int i = 0; i < kLines; ++i) __builtin_prefetch(static_cast<const char*>(at) + 64 * i);
+}
+
+template <Query query, class Isa, class Stats>
+class StreamWalk {
+public:
+    PACKET_INLINE StreamWalk(const TreeView& tree, std::int32_t instance_id, Stats& stats)
+        : tree_(tree), instance_id_(instance_id), stats_(stats) {}
+
+    /// Walks the tree with all active rays.
+    PACKET_INLINE void run(StreamRays<Isa>& rays) {
+        looking_ = rays.active;
+        if (looking_ == 0) return;
+        visit(rays, tree_.wide_nodes[0], looking_);
+        while (size_ != 0) {
+            const Entry& top = stack_[--size_];
+            const RaySet active = top.rays & looking_;
+            if (active == 0) continue;
+            if (top.child.is_leaf()) {
+                meet_leaf(rays, {top.child.link, top.child.count}, active, top.enter);
+            } else {
+                visit(rays, tree_.wide_nodes[top.child.link], active);
+            }
+        }
+    }
+
+private:
+    using F = Float<kWideSize, Isa>;
+    using I = Int<kWideSize, Isa>;
+
+    /// A subtree to visit, by the rays that met its box. None enters it before `enter`.
+    struct Entry {
+        WideChild child;
+        RaySet rays;
+        float enter;
+    };
+
+    /// The planes of a node's children, in the order in which they are met.
+    struct NodePlanes {
+        F near[3], far[3];
+
+        PACKET_INLINE NodePlanes(const WideNode& node, const int (&near_side)[3]) {
+            for (int a = 0; a < 3; ++a) {
+                near[a] = F::load(node.plane[near_side[a]][a]);
+                far[a] = F::load(node.plane[1 - near_side[a]][a]);
+            }
+        }
+        /// The children that the ray meets; in `enter` where.
+        PACKET_INLINE Mask<kWideSize, Isa> meets(const StreamRay& ray, F& enter) const {
+            F exit;
+            enter = ray.tnear;
+            for (int a = 0; a < 3; ++a) {
+                const F inv_dir(ray.inv_dir[a]);
+                const F t_far = multiply_subtract(far[a], inv_dir, F(ray.far_shift[a]));
+                enter = max(multiply_subtract(near[a], inv_dir, F(ray.near_shift[a])), enter);
+                exit = a == 0 ? t_far : min(exit, t_far);
+            }
+            // if (enter > min(exit, best_t)) the ray misses; equal must pass, for the tie rule
+            return enter <= min(exit, F(ray.best_t));
+        }
+    };
+
+    PACKET_INLINE void visit(const StreamRays<Isa>& rays, const WideNode& node, RaySet active) {
+        stats_.visit(__builtin_popcountll(active), __builtin_popcountll(active));
+        const NodePlanes planes(node, rays.near_side);
+        I found[2] = {I(0), I(0)};
+        F first_enter(__builtin_huge_valf());
+        for (RaySet left = active; left != 0; left &= left - 1) {
+            const int r = __builtin_ctzll(left);
+            F enter;
+            const auto meets = planes.meets(rays.ray[r], enter);
+            for (int i = 0; i < 2; ++i) {
+                found[i] = found[i] | select(meets, I(bits_.half[r][i]), I(0));
+            }
+            if constexpr (query == Query::kClosest) {
+                first_enter = select(meets, min(enter, first_enter), first_enter);
+            }
+        }
+        const std::uint32_t all = (1u << kWideSize) - 1;
+        push(node, all & ~((found[0] | found[1]) == I(0)).bits(), found, first_enter);
+    }
+
+    /// Pushes the children of `bits`, for closest-hit the one that is entered first last. Any-hit
+    /// takes them as they come.
+    PACKET_INLINE void push(const WideNode& node, std::uint32_t bits, const I (&found)[2],
+                            const F& first_enter) {
+        if (bits == 0) return;
+        std::int32_t half[2][kWideSize];
+        found[0].store(half[0]), found[1].store(half[1]);
+        float enter[kWideSize];
+        first_enter.store(enter);
+        const int bottom = size_;
+        for (; bits != 0; bits &= bits - 1) {
+            const int child = __builtin_ctz(bits);
+            const RaySet set = static_cast<std::uint32_t>(half[0][child]) |
+                               RaySet{static_cast<std::uint32_t>(half[1][child])} << 32;
+            prefetch(tree_, node.child[child]);
+            int place = size_++;
+            if constexpr (query == Query::kClosest) {
+                for (; place > bottom && stack_[place - 1].enter < enter[child]; --place) {
+                    stack_[place] = stack_[place - 1];
+                }
+            }
+            stack_[place] = {node.child[child], set, enter[child]};
+        }
+    }
+
+    PACKET_INLINE void meet_leaf(StreamRays<Isa>& rays, BlockRange range, RaySet active,
+                                 float enter) {
+        for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
+            for (RaySet left = active & looking_; left != 0; left &= left - 1) {
+                const int r = __builtin_ctzll(left);
+                if (query == Query::kClosest && enter > rays.ray[r].best_t) continue;
+                stats_.triangles(__builtin_popcount(range.lanes(b)));
+                meet_block(rays, r, tree_.blocks[b]);
+            }
+        }
+    }
+
+    /// As SingleLeaf does.
+    PACKET_INLINE void meet_block(StreamRays<Isa>& rays, int r, const TriangleBlock& block) {
+        StreamRay& ray = rays.ray[r];
+        ShearRays<kBlockSize, Isa> shear;
+        for (int a = 0; a < 3; ++a) {
+            shear.org[a] = ray.shear_org[a];
+            shear.axis[a] = rays.axis[a];
+        }
+        shear.shear_x = ray.shear_x;
+        shear.shear_y = ray.shear_y;
+        const auto sheared = packet::shear<Directions::kShared>(shear, BlockTriangles{block});
+        const auto candidates = sheared.may_hit();
+        if (none(candidates)) return;
+        const SingleRay single = rays.single(r);
+        BestHits<1, Isa>& best = rays.best[r];
+        SingleLeaf<query, Isa>{tree_, single, instance_id_, best}.take(
+            block, decide_hits(sheared, SingleHitRay<kBlockSize, Isa>(single), F(ray.best_t),
+                               candidates, BlockTriangles{block}));
+        ray.best_t = best.t.r[0];
+        if (query == Query::kAny && ray.best_t == kNever) looking_ &= ~(RaySet{1} << r);
+    }
+
+    const TreeView& tree_;
+    std::int32_t instance_id_;
+    Stats& stats_;
+    const RayBits bits_;
+    RaySet looking_ = 0;  ///< rays that may still find something
+    int size_ = 0;
+    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
+    Entry stack_[kMaxDepth * (kWideSize - 1) + kWideSize];
+};
+
+}  // namespace packet

@@ -1,0 +1,44 @@
+// The order in which streams take rays that come in any: by class of direction, then along a Morton
+// curve through their origins, so that neighbours go the same way through the same nodes.
+#pragma once
+
+#include "core/aligned_vector.h"
+
+#include <packet/bounds.h>
+#include <packet/ray.h>
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+namespace packet {
+
+/// Sorts rays. Keeps its memory for the next time: new memory would cost as much as the sorting.
+class StreamOrder {
+public:
+    static constexpr std::size_t kMostRays = 65536;
+
+    /// The indices of `rays`, kMostRays at most, in that order, until the next call. `world` is the
+    /// scene's box, not empty. O(n) time, 9 bytes a ray.
+    [[nodiscard]] std::span<const std::uint32_t> sort(std::span<const Ray> rays,
+                                                      const Bounds3f& world);
+
+private:
+    ScratchVector<std::uint32_t> items_, scratch_;
+    ScratchVector<std::uint8_t> classes_;
+};
+
+/// Lends the tasks of a call one each.
+class StreamOrders {
+public:
+    [[nodiscard]] std::unique_ptr<StreamOrder> take();
+    void give_back(std::unique_ptr<StreamOrder> order);
+
+private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<StreamOrder>> idle_;
+};
+
+}  // namespace packet

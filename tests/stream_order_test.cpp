@@ -1,0 +1,77 @@
+// What streams rely on: all rays once, each class in one run, neighbours near each other.
+#include "schedule/stream_order.h"
+#include "core/direction_class.h"
+#include "generate.h"
+#include "test_rays.h"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+using namespace packet;
+using namespace packet::test;
+
+namespace {
+
+int class_of(const Ray& ray) { return direction_class(ray.dir.x, ray.dir.y, ray.dir.z); }
+
+}  // namespace
+
+TEST_SUITE_BEGIN("stream order");
+
+TEST_CASE("a direction's class is its octant and longest axis") {
+    CHECK(direction_class(1, 2, 3) == 16);
+    CHECK(direction_class(-1, 2, 3) == 17);
+    CHECK(direction_class(1, -3, 2) == 10);
+    CHECK(direction_class(4, 3, -4) == 4);
+    // 1 / -0 is negative, so the ray meets upper planes first
+    CHECK(direction_class(-0.0f, 1, 0) == 9);
+    CHECK(direction_class(0.0f, 1, -0.0f) == 12);
+    CHECK(direction_class(-0.0f, -0.0f, -0.0f) == 7);
+}
+
+TEST_CASE("rays are sorted by class, then by origin") {
+    const Bounds3f world{{-1, -2, -3}, {4, 1, 2}};
+    StreamOrder order;
+    for (const std::size_t count : {std::size_t{1}, std::size_t{777}, StreamOrder::kMostRays}) {
+        const std::vector<Ray> rays = random_rays(world, count, 5);
+        const auto sorted = order.sort(rays, world);
+        std::vector<std::uint32_t> all(sorted.begin(), sorted.end()), want(count);
+        CHECK(std::ranges::is_sorted(all, {}, [&](auto i) { return class_of(rays[i]); }));
+        std::ranges::sort(all);
+        std::iota(want.begin(), want.end(), 0u);
+        CHECK(all == want);
+    }
+    CHECK(order.sort({}, world).empty());
+}
+
+TEST_CASE("rays that follow each other start near each other") {
+    const Bounds3f world{{0, 0, 0}, {1, 1, 1}};
+    std::vector<Ray> rays = random_rays(world, 20000, 6);
+    for (Ray& ray : rays) ray.dir = {0, 0, 1};
+    StreamOrder order;
+    const auto sorted = order.sort(rays, world);
+    float way = 0, sorted_way = 0;
+    for (std::size_t i = 1; i < rays.size(); ++i) {
+        way += glm::distance(rays[i].org, rays[i - 1].org);
+        sorted_way += glm::distance(rays[sorted[i]].org, rays[sorted[i - 1]].org);
+    }
+    CHECK(sorted_way < 0.25f * way);
+}
+
+TEST_CASE("origins that are no points, far away, or in a flat world") {
+    const float inf = INFINITY, nan = std::nanf("");
+    std::vector<Ray> rays(6);
+    const float x[] = {inf, -inf, nan, 1e38f, -1e38f, 0.5f};
+    for (std::size_t i = 0; i < rays.size(); ++i) rays[i].org = {x[i], 0, x[i]};
+    StreamOrder order;
+    for (const Bounds3f& world : {Bounds3f{{0, 0, 0}, {1, 1, 1}}, Bounds3f{{0, 0, 0}, {0, 0, 0}},
+                                  Bounds3f{{-1.8e18f, 0, 0}, {1.8e18f, 0, 1e-40f}}}) {
+        const auto sorted = order.sort(rays, world);
+        CHECK(std::accumulate(sorted.begin(), sorted.end(), 0u) == 15);
+    }
+}
+
+TEST_SUITE_END();
