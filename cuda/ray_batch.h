@@ -11,6 +11,9 @@ namespace packet::cuda {
 
 using BestHit = BestHits<1, isa::CudaThread>;
 
+/// What a walk has to be ready for: kernels for one mesh keep no ray of the world at hand.
+enum class Levels : std::uint8_t { kOneMesh, kInstances };
+
 /// Work of a launch, as in TraceStats.
 struct WorkCounts {
     unsigned long long nodes, triangles, lanes_issued;

@@ -12,38 +12,48 @@
 
 namespace packet::cuda {
 
+/// Down the top tree, into the mesh, and down its tree.
+inline constexpr std::uint32_t kMostEntries = 2 * kMaxDepth + 2;
+/// So many of them are in shared memory. A walk is seldom deeper.
+inline constexpr std::uint32_t kSharedEntries = 8;
+
+/// The rest, in the thread's local memory: an object of its own, since what is indexed takes all
+/// that it is a member of out of the registers.
+struct FarEntries {
+    float enter[kMostEntries - kSharedEntries];
+    std::uint32_t node[kMostEntries - kSharedEntries];
+};
+
 /// A thread's stack. Its first entries, where a walk mostly is, lie in shared memory, the others in
 /// the thread's local memory.
 class ShortStack {
 public:
-    static constexpr std::uint32_t kShared = 8;
-    /// Down the top tree, into the mesh, and down its tree.
-    static constexpr std::uint32_t kEntries = 2 * kMaxDepth + 2;
-
     PACKET_INLINE static constexpr std::uint32_t words(std::uint32_t threads) {
-        return 2 * kShared * threads;
+        return 2 * kSharedEntries * threads;
     }
-    PACKET_DEVICE ShortStack()
-        : enter_(0, kShared * blockDim.x), node_(kShared * blockDim.x, kShared * blockDim.x) {}
+    PACKET_DEVICE explicit ShortStack(FarEntries& far)
+        : enter_(0, kSharedEntries * blockDim.x),
+          node_(kSharedEntries * blockDim.x, kSharedEntries * blockDim.x),
+          far_(far) {}
 
     PACKET_DEVICE void push(float enter, std::uint32_t node) {
-        if (depth_ < kShared) {
+        if (depth_ < kSharedEntries) {
             enter_[place(depth_)] = enter;
             node_[place(depth_)] = node;
         } else {
-            far_enter_[depth_ - kShared] = enter;
-            far_node_[depth_ - kShared] = node;
+            far_.enter[depth_ - kSharedEntries] = enter;
+            far_.node[depth_ - kSharedEntries] = node;
         }
         ++depth_;
     }
     PACKET_DEVICE std::uint32_t pop(float& enter) {
         --depth_;
-        if (depth_ < kShared) {
+        if (depth_ < kSharedEntries) {
             enter = enter_[place(depth_)];
             return node_[place(depth_)];
         }
-        enter = far_enter_[depth_ - kShared];
-        return far_node_[depth_ - kShared];
+        enter = far_.enter[depth_ - kSharedEntries];
+        return far_.node[depth_ - kSharedEntries];
     }
     PACKET_DEVICE void clear() { depth_ = 0; }
     PACKET_DEVICE bool is_empty() const { return depth_ == 0; }
@@ -57,16 +67,15 @@ private:
     SharedArray<float> enter_;
     SharedArray<std::uint32_t> node_;
     std::uint32_t depth_ = 0;
-    float far_enter_[kEntries - kShared];
-    std::uint32_t far_node_[kEntries - kShared];
+    FarEntries& far_;
 };
 
 /// One ray on its way through the scene.
-template <Query query, class Stats>
+template <Levels levels, Query query, class Stats>
 class ThreadWalk {
 public:
-    PACKET_DEVICE ThreadWalk(const SceneView& scene, const RayBatch& batch)
-        : scene_(scene), batch_(batch) {}
+    PACKET_DEVICE ThreadWalk(const SceneView& scene, const RayBatch& batch, FarEntries& far)
+        : scene_(scene), batch_(batch), stack_(far) {}
 
     /// Without a ray, or done with it.
     PACKET_DEVICE bool is_idle() const { return ray_id_ == kNoRay; }
@@ -84,7 +93,7 @@ public:
         leaf_ = {0, 0};
         node_id_ = kDone;
         if (none(active)) return;
-        if (scene_.is_single_mesh) {
+        if (levels == Levels::kOneMesh) {
             enter_mesh(scene_.instances[0], ray);
         } else {
             enter_top(ray);
@@ -119,15 +128,15 @@ public:
             leaf_.count = 0;
             if (query == Query::kAny && best_.t.r[0] == kNever) node_id_ = kDone;
             put_off_leaf();
-        } else if (node_id_ == kLeave) {
+        } else if (levels == Levels::kInstances && node_id_ == kLeave) {
             ++instance_;
             if (instance_ == instance_end_) {
                 enter_top_again();
             } else {
                 enter_instance();
             }
-        } else if (node_id_ < kLeave && node_.is_leaf()) {  // of the top tree
-            instance_ = node_.link;
+        } else if (levels == Levels::kInstances && node_id_ < kLeave && node_.is_leaf()) {
+            instance_ = node_.link;  // of the top tree
             instance_end_ = node_.link + node_.count;
             enter_instance();
         }
@@ -142,9 +151,11 @@ private:
     // than 2^32 - 2 nodes.
     static constexpr std::uint32_t kLeave = 0xFFFFFFFE, kDone = 0xFFFFFFFF;
 
+    PACKET_DEVICE bool is_in_mesh() const { return levels == Levels::kOneMesh || is_in_mesh_; }
+
     /// If the node is a leaf of triangles: meets it later and goes on, unless one waits already.
     PACKET_DEVICE void put_off_leaf() {
-        if (!is_in_mesh_ || node_id_ >= kLeave || !node_.is_leaf() || leaf_.count != 0) return;
+        if (!is_in_mesh() || node_id_ >= kLeave || !node_.is_leaf() || leaf_.count != 0) return;
         leaf_ = node_;
         pop();
     }

@@ -16,6 +16,8 @@ namespace {
 
 // Four warps to a block: small enough that blocks fill a multiprocessor whatever memory is left.
 constexpr unsigned kBlockThreads = 128;
+// Blocks a multiprocessor: what leaves threads the registers that they need without spilling.
+constexpr unsigned kLeastBlocks = 4;
 // Idle lanes at which a warp fetches. Fetching costs all of its lanes the set-up of the new rays.
 constexpr int kLeastIdleLanes = 8;
 
@@ -26,9 +28,10 @@ PACKET_DEVICE std::uint32_t fetch_slots(const RayBatch& batch, std::uint32_t amo
     return __shfl_sync(kFullWarp, first, 0);
 }
 
-template <Query query, class Stats>
-__global__ __launch_bounds__(kBlockThreads) void trace_by_warps(SceneView scene, RayBatch batch,
-                                                                std::uint32_t stack_depth) {
+template <Levels levels, Query query, class Stats>
+__global__ __launch_bounds__(kBlockThreads,
+                             kLeastBlocks) void trace_by_warps(SceneView scene, RayBatch batch,
+                                                               std::uint32_t stack_depth) {
     Stats stats;
     WarpStack stack(stack_depth);
     const std::uint32_t slots = slot_count(batch);
@@ -38,7 +41,7 @@ __global__ __launch_bounds__(kBlockThreads) void trace_by_warps(SceneView scene,
         const std::uint32_t i = ray_of_slot(batch, first + lane_id());
         const LaneRay ray = load_ray(batch, i);
         BestHit best(ray.tfar, usable(ray));
-        walk_scene<query>(scene, ray, best, stack, stats);
+        walk_scene<levels, query>(scene, ray, best, stack, stats);
         if (i != kNoRay) store_hit<query>(scene, batch, i, best);
     }
     stats.add_to(batch.work);
@@ -58,10 +61,12 @@ PACKET_DEVICE bool refill(const RayBatch& batch, std::uint32_t slots, Walk& walk
     return first < slots;
 }
 
-template <Query query, class Stats>
-__global__ __launch_bounds__(kBlockThreads) void trace_by_threads(SceneView scene, RayBatch batch) {
+template <Levels levels, Query query, class Stats>
+__global__ __launch_bounds__(kBlockThreads, kLeastBlocks) void trace_by_threads(SceneView scene,
+                                                                                RayBatch batch) {
     Stats stats;
-    ThreadWalk<query, Stats> walk(scene, batch);
+    FarEntries far;
+    ThreadWalk<levels, query, Stats> walk(scene, batch, far);
     const std::uint32_t slots = slot_count(batch);
     bool more = true;
     for (;;) {
@@ -99,35 +104,41 @@ unsigned resident_blocks(Kernel kernel, std::size_t shared_bytes, std::uint32_t 
     return std::clamp((slots + kBlockThreads - 1) / kBlockThreads, 1u, std::max(resident, 1u));
 }
 
-template <Query query, class Stats>
+template <Levels levels, Query query, class Stats>
 void launch_by(const SceneView& scene, const RayBatch& batch, const TraceLaunch& how) {
     const std::uint32_t slots = slot_count(batch);
     if (how.walk == Walk::kWarp) {
         const std::size_t bytes =
             sizeof(std::uint32_t) * (kBlockThreads / kWarpSize) * WarpStack::words(how.stack_depth);
-        const auto kernel = trace_by_warps<query, Stats>;
+        const auto kernel = trace_by_warps<levels, query, Stats>;
         launch(kernel, {resident_blocks(kernel, bytes, slots), kBlockThreads, bytes, how.stream},
                scene, batch, how.stack_depth);
     } else {
         const std::size_t bytes = sizeof(std::uint32_t) * ShortStack::words(kBlockThreads);
-        const auto kernel = trace_by_threads<query, Stats>;
+        const auto kernel = trace_by_threads<levels, query, Stats>;
         launch(kernel, {resident_blocks(kernel, bytes, slots), kBlockThreads, bytes, how.stream},
                scene, batch);
     }
     check(cudaGetLastError(), "launch of a trace kernel");
 }
 
+template <Levels levels, Query query>
+void launch_counting(const SceneView& scene, const RayBatch& batch, const TraceLaunch& how) {
+    how.counting == Counting::kYes ? launch_by<levels, query, Counts>(scene, batch, how)
+                                   : launch_by<levels, query, NoCounts>(scene, batch, how);
+}
+
+template <Levels levels>
+void launch_query(const SceneView& scene, const RayBatch& batch, const TraceLaunch& how) {
+    how.query == Query::kClosest ? launch_counting<levels, Query::kClosest>(scene, batch, how)
+                                 : launch_counting<levels, Query::kAny>(scene, batch, how);
+}
+
 }  // namespace
 
 void launch_trace(const SceneView& scene, const RayBatch& batch, const TraceLaunch& how) {
-    const bool counts = how.counting == Counting::kYes;
-    if (how.query == Query::kClosest) {
-        counts ? launch_by<Query::kClosest, Counts>(scene, batch, how)
-               : launch_by<Query::kClosest, NoCounts>(scene, batch, how);
-    } else {
-        counts ? launch_by<Query::kAny, Counts>(scene, batch, how)
-               : launch_by<Query::kAny, NoCounts>(scene, batch, how);
-    }
+    scene.is_single_mesh ? launch_query<Levels::kOneMesh>(scene, batch, how)
+                         : launch_query<Levels::kInstances>(scene, batch, how);
 }
 
 }  // namespace packet::cuda

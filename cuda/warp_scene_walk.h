@@ -55,22 +55,22 @@ PACKET_DEVICE void meet_instances(const SceneView& scene, const LaneRay& ray, st
     best.t = select(active, best.t, kept);
 }
 
-template <Query query, class Stats>
+template <Levels levels, Query query, class Stats>
 PACKET_DEVICE void walk_scene(const SceneView& scene, const LaneRay& ray, BestHit& best,
                               WarpStack& stack, Stats& stats) {
-    if (scene.is_single_mesh) {
+    if constexpr (levels == Levels::kOneMesh) {
         const InstanceView& only = scene.instances[0];
         walk_mesh<query>(static_cast<const DeviceTree&>(*only.tree), ray,
                          static_cast<std::int32_t>(only.instance_id), best, stack, stats);
-        return;
+    } else {
+        if (scene.top.node_count == 0) return;
+        PreparedLane prepared;
+        prepare_lane(prepared, scene.top, ray);
+        walk_tree(scene.top, prepared, best.t, stack, stats,
+                  [&](std::uint32_t first, std::uint32_t count, LaneMask1 active) {
+                      meet_instances<query>(scene, ray, first, count, active, best, stack, stats);
+                  });
     }
-    if (scene.top.node_count == 0) return;
-    PreparedLane prepared;
-    prepare_lane(prepared, scene.top, ray);
-    walk_tree(scene.top, prepared, best.t, stack, stats,
-              [&](std::uint32_t first, std::uint32_t count, LaneMask1 active) {
-                  meet_instances<query>(scene, ray, first, count, active, best, stack, stats);
-              });
 }
 
 }  // namespace packet::cuda
