@@ -1,53 +1,22 @@
 // Tracing on the device: every hit of every mode is the CPU's, to the bit. Compiled twice: for the
 // device there is, and for one that is emulated on the CPU.
 #include "configurations.h"
+#include "cuda_device.h"
 #include "generate.h"
 #include "test_rays.h"
-
-#include <packet/cuda.h>
-#include <packet/error.h>
-
-#if defined(PACKET_EMULATED)
-#include "emulation/grid.h"
-#endif
 
 #include <doctest/doctest.h>
 
 #include <cstring>
-#include <iostream>
 
 using namespace packet;
 using namespace packet::test;
 using cuda::DeviceMode;
 using cuda::DeviceScene;
 
-#if defined(PACKET_EMULATED)
-#define PACKET_DEVICE_SUITE "cuda_emulated"
-#else
-#define PACKET_DEVICE_SUITE "cuda_device"
-#endif
-TEST_SUITE_BEGIN(PACKET_DEVICE_SUITE);
+TEST_SUITE_BEGIN("cuda");
 
 namespace {
-
-/// Whether to go on; else says that the test was skipped. ctest takes the line for that.
-bool has_device() {
-    try {
-        (void)cuda::device_name();
-        return true;
-    } catch (const Error& error) {
-        std::cout << "skipped: " << error.what() << "\n";
-        return false;
-    }
-}
-
-#if defined(PACKET_EMULATED)
-constexpr int kOrders = 3;
-void set_order(int order) { emulation::set_order(static_cast<emulation::Order>(order), 11); }
-#else
-constexpr int kOrders = 1;
-void set_order(int) {}
-#endif
 
 constexpr DeviceMode kModes[] = {DeviceMode::kWarp, DeviceMode::kThread, DeviceMode::kSorted};
 
@@ -71,8 +40,8 @@ void check_device(const Scene& scene, std::span<const Ray> rays, const std::stri
     std::vector<Hit> want(rays.size());
     trace_closest(scene, rays, want);
     const DeviceScene device(scene);
-    for (int order = 0; order < kOrders; ++order) {
-        set_order(order);
+    for (int order = 0; order < kThreadOrders; ++order) {
+        set_thread_order(order);
         INFO("order " << order);
         for (const DeviceMode mode : kModes) check_mode(device, rays, want, {mode, 0, nullptr});
     }
