@@ -17,7 +17,8 @@ namespace {
 // Four warps to a block: small enough that blocks fill a multiprocessor whatever memory is left.
 constexpr unsigned kBlockThreads = 128;
 // Blocks a multiprocessor: what leaves threads the registers that they need without spilling.
-constexpr unsigned kLeastBlocks = 4;
+// (Without nvcc nothing asks for it.)
+[[maybe_unused]] constexpr unsigned kLeastBlocks = 4;
 // Idle lanes at which a warp fetches. Fetching costs all of its lanes the set-up of the new rays.
 constexpr int kLeastIdleLanes = 8;
 
