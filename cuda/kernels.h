@@ -24,6 +24,6 @@ struct TraceLaunch {
 
 /// Traces the batch, later, in the stream. Throws Error{kUnsupported} if the device has too little
 /// shared memory for the stack.
-void launch_trace(const SceneView& scene, const RayBatch& batch, const TraceLaunch& launch);
+void launch_trace(const SceneView& scene, const RayBatch& batch, const TraceLaunch& how);
 
 }  // namespace packet::cuda

@@ -50,7 +50,9 @@ UploadedScene::UploadedScene(const SceneAccel& accel) : view_(accel.view) {
     instances_ = DeviceArray<InstanceView>(std::span<const InstanceView>(instances));
     mesh_of_instance_ =
         DeviceArray<std::uint32_t>(std::span<const std::uint32_t>(accel.mesh_of_instance));
-    static_cast<TreeView&>(view_.top) = upload(accel.view.top, 0);
+    const DeviceTree top = upload(accel.view.top, 0);
+    view_.top.nodes = top.nodes;
+    view_.top.wide_nodes = nullptr;
     view_.instances = instances_.data();
     view_.mesh_of_instance = mesh_of_instance_.data();
 }

@@ -71,10 +71,9 @@ void Fiber::start(void (*function)(void*), void* argument) {
     function_ = function;
     argument_ = argument;
     fake_inside_ = nullptr;
-    const auto top =
-        reinterpret_cast<std::uintptr_t>(stack_.get() + kStackBytes) & ~std::uintptr_t{15};
-    // As after a call: the stack pointer is 8 off a multiple of 16 when the function starts.
-    auto* slots = reinterpret_cast<void**>(top) - 8;
+    // As after a call: the stack pointer is 8 off a multiple of 16 when the function starts. (What
+    // new yields is aligned to 16, and so is the stack's size.)
+    auto* slots = reinterpret_cast<void**>(stack_.get() + kStackBytes) - 8;
     for (int i = 0; i < 6; ++i) slots[i] = nullptr;  // registers
     slots[6] = reinterpret_cast<void*>(+[] { enter(entering); });
     slots[7] = nullptr;  // a return address that ends backtraces
