@@ -292,8 +292,8 @@ TEST_CASE("a CUDA device gives the same hits, or is told to be missing") {
     program.output("trace scene.glb rays.npy -o hits.npy");
     const Outcome outcome = program.run("trace scene.glb rays.npy -o cuda.npy --device cuda");
     if (outcome.exit_code != 0) {
-        check_failure(outcome, 1, "CUDA");
-        check_failure(program.run("render scene.glb -o x.png --device cuda"), 1, "CUDA");
+        check_failure(outcome, 2, "CUDA");
+        check_failure(program.run("render scene.glb -o x.png --device cuda"), 2, "CUDA");
         CHECK(!std::filesystem::exists(program.dir() / "cuda.npy"));
         return;
     }
