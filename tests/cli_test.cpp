@@ -142,6 +142,7 @@ TEST_CASE("unknown names list the valid ones") {
     check_failure(program.run(trace + "--accel fast"), 2, "bvh");
     check_failure(program.run(trace + "--mode fast"), 2, "packet8");
     check_failure(program.run(trace + "--isa mmx"), 2, "sse42");
+    check_failure(program.run(trace + "--device gpu"), 2, "valid are: cpu, cuda");
     check_failure(program.run(trace + "--quality best"), 2, "valid are: fast, balanced, high");
     check_failure(program.run(trace, "PACKET_ISA=mmx"), 2, "sse42");
 }
@@ -229,10 +230,12 @@ TEST_CASE("trace reports one JSON object") {
     const ProgramWithScene program;
     const std::string trace = "trace scene.glb rays.npy --json --repeat 3 --threads 1 ";
     json report = json::parse(program.output(trace));
-    CHECK(keys(report) == std::vector<std::string>{"accel", "build", "hits", "isa", "mode", "query",
-                                                   "rays", "scene", "stats", "threads", "trace"});
+    CHECK(keys(report) == std::vector<std::string>{"accel", "build", "device", "hits", "isa",
+                                                   "mode", "query", "rays", "scene", "stats",
+                                                   "threads", "trace"});
     CHECK(report["scene"] == json{{"triangles", 1800}, {"instances", 1}});
     CHECK(keys(report["build"]) == std::vector<std::string>{"bytes", "sah_cost", "seconds"});
+    CHECK(report["device"] == "cpu");
     CHECK(keys(report["trace"]) == std::vector<std::string>{"mrays_per_s", "repeats", "seconds"});
     CHECK(report["trace"]["repeats"] == 3);
     CHECK(report["rays"] == 32 * 24);
@@ -282,6 +285,22 @@ TEST_CASE("an any-hit query writes a byte for each ray") {
     const std::string bytes = data_of(program.dir() / "any.npy", 768);
     const std::vector<Hit> hits = read_hits(program.dir() / "hits.npy", 768);
     for (std::size_t i = 0; i < hits.size(); ++i) REQUIRE((bytes[i] == 1) == hits[i].is_hit());
+}
+
+TEST_CASE("a CUDA device gives the same hits, or is told to be missing") {
+    const ProgramWithScene program;
+    program.output("trace scene.glb rays.npy -o hits.npy");
+    const Outcome outcome = program.run("trace scene.glb rays.npy -o cuda.npy --device cuda");
+    if (outcome.exit_code != 0) {
+        check_failure(outcome, 2, "CUDA");
+        check_failure(program.run("render scene.glb -o x.png --device cuda"), 2, "CUDA");
+        CHECK(!std::filesystem::exists(program.dir() / "cuda.npy"));
+        return;
+    }
+    CHECK(read_text(program.dir() / "cuda.npy") == read_text(program.dir() / "hits.npy"));
+    program.output("render scene.glb -o cpu.png --size 64x64 --shading path");
+    program.output("render scene.glb -o cuda.png --size 64x64 --shading path --device cuda");
+    CHECK(read_text(program.dir() / "cuda.png") == read_text(program.dir() / "cpu.png"));
 }
 
 TEST_CASE("no rays are traced as well") {

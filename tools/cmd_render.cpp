@@ -1,5 +1,6 @@
 // packet render: an image of a scene.
 #include "commands.h"
+#include "cuda_tracer.h"
 #include "options.h"
 #include "progress.h"
 #include "render.h"
@@ -23,9 +24,18 @@ struct RenderOptions {
     int samples = 0;
     CameraOptions camera;
     CommonOptions common;
+    Named<Device> device = kDevices[0];
 };
 
+std::unique_ptr<const Tracer> make_tracer(const Scene& scene, const RenderOptions& options) {
+    const TraceOptions& trace = options.common.trace;
+    if (options.device.value == Device::kCpu) return std::make_unique<CpuTracer>(scene, trace);
+    return std::make_unique<CudaTracer>(scene, device_mode(trace.mode));
+}
+
 void run(const RenderOptions& options) {
+    if (options.device.value == Device::kCuda)
+        (void)cuda::device_name();    // throws if there is none
     OutputFile file(options.output);  // first, so that a bad name is told before the work is done
     Scene scene = load_gltf(options.scene).scene;
     const Camera camera(options.camera, scene.bounds());
@@ -33,7 +43,7 @@ void run(const RenderOptions& options) {
 
     const auto start = std::chrono::steady_clock::now();
     const Image image =
-        render(scene, camera, *options.shading, options.samples, options.common.trace);
+        render(scene, camera, *options.shading, options.samples, *make_tracer(scene, options));
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     write_png(std::move(file), image);
     print(fmt::format("{}: {} x {} pixels, {}, {:.2f} s\n", options.output, image.size.width,
@@ -59,6 +69,7 @@ void add_render_command(CLI::App& program) {
         ->capture_default_str();
     add_camera_options(app, options->camera);
     add_common_options(app, options->common);
+    add_device_option(app, options->device);
     app.callback([options] { run(*options); });
 }
 

@@ -1,5 +1,6 @@
 // packet trace: traces rays from a file, writes their hits and reports the speed.
 #include "commands.h"
+#include "cuda_tracer.h"
 #include "npy.h"
 #include "options.h"
 #include "progress.h"
@@ -29,6 +30,7 @@ struct TraceCommand {
     int repeats = 1;
     bool flatten = false, stats = false, json = false;
     CommonOptions common;
+    Named<Device> device = kDevices[0];
 };
 
 /// What the rays met, in the form that the query asks for; the other is empty.
@@ -47,35 +49,60 @@ struct Answer {
     }
 };
 
-void trace(const Scene& scene, std::span<const Ray> rays, Query query, const TraceOptions& options,
-           Answer& answer) {
-    if (query == Query::kAny) {
-        trace_any(scene, rays, answer.occluded, options);
-    } else {
-        trace_closest(scene, rays, answer.hits, options);
+/// What the command names, with the scene in its memory.
+class Contender {
+public:
+    Contender(const Scene& scene, const TraceCommand& command)
+        : scene_(scene), options_(command.common.trace), query_(command.query.value) {
+        if (command.device.value == Device::kCuda) device_.emplace(scene);
     }
-}
+
+    void trace(std::span<const Ray> rays, Answer& answer, TraceStats* stats = nullptr) const {
+        if (device_) {
+            trace_on(*device_, rays, answer, {device_mode(options_.mode), options_.width, stats});
+            return;
+        }
+        TraceOptions options = options_;
+        options.stats = stats;
+        if (query_ == Query::kAny) {
+            trace_any(scene_, rays, answer.occluded, options);
+        } else {
+            trace_closest(scene_, rays, answer.hits, options);
+        }
+    }
+
+private:
+    void trace_on(const cuda::DeviceScene& device, std::span<const Ray> rays, Answer& answer,
+                  const cuda::DeviceTraceOptions& options) const {
+        if (query_ == Query::kAny) {
+            device.trace_any(rays, answer.occluded, options);
+        } else {
+            device.trace_closest(rays, answer.hits, options);
+        }
+    }
+
+    const Scene& scene_;
+    TraceOptions options_;
+    Query query_;
+    std::optional<cuda::DeviceScene> device_;
+};
 
 /// The median time of tracing, from rays in memory to hits in memory.
-double measure(const Scene& scene, std::span<const Ray> rays, const TraceCommand& command,
+double measure(const Contender& contender, std::span<const Ray> rays, const TraceCommand& command,
                Answer& answer) {
     std::vector<double> seconds;
     Progress progress("trace", static_cast<std::size_t>(command.repeats));
     for (int repeat = 0; repeat < command.repeats; ++repeat) {
-        seconds.push_back(seconds_of(
-            [&] { trace(scene, rays, command.query.value, command.common.trace, answer); }));
+        seconds.push_back(seconds_of([&] { contender.trace(rays, answer); }));
         progress.advance(1);
     }
     return median(std::move(seconds));
 }
 
 /// Counts the work in a run of its own, as counting takes time.
-TraceStats count_work(const Scene& scene, std::span<const Ray> rays, const TraceCommand& command,
-                      Answer& answer) {
+TraceStats count_work(const Contender& contender, std::span<const Ray> rays, Answer& answer) {
     TraceStats stats;
-    TraceOptions options = command.common.trace;
-    options.stats = &stats;
-    trace(scene, rays, command.query.value, options, answer);
+    contender.trace(rays, answer, &stats);
     return stats;
 }
 
@@ -86,6 +113,7 @@ TraceReport describe(const Scene& scene, const TraceCommand& command) {
     report.instances = scene.instances().size();
     report.accel = chosen_accel(common.build);
     report.mode = common.trace.mode;
+    report.device = command.device.name;
     report.isa = common.trace.isa ? *common.trace.isa : default_isa();
     const int all = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
     report.threads = common.trace.threads == 0 ? all : std::min(common.trace.threads, all);
@@ -104,6 +132,8 @@ void write(OutputFile file, const TraceCommand& command, const Answer& answer) {
 }
 
 void run(const TraceCommand& command) {
+    if (command.device.value == Device::kCuda)
+        (void)cuda::device_name();   // throws if there is none
     std::optional<OutputFile> file;  // first, so that a bad name is told before the work is done
     if (!command.output.empty()) file.emplace(command.output);
     const std::vector<Ray> rays = read_rays(command.rays);
@@ -113,8 +143,9 @@ void run(const TraceCommand& command) {
 
     Answer answer(command.query.value, rays.size());
     TraceReport report = describe(scene, command);
-    report.seconds = measure(scene, rays, command, answer);
-    if (command.stats) report.stats = count_work(scene, rays, command, answer);
+    const Contender contender(scene, command);
+    report.seconds = measure(contender, rays, command, answer);
+    if (command.stats) report.stats = count_work(contender, rays, answer);
     report.rays = rays.size();
     report.hits = answer.hit_count();
     if (file) write(std::move(*file), command, answer);
@@ -151,6 +182,7 @@ void add_trace_command(CLI::App& program) {
     app.add_flag("--stats", command->stats, "Count nodes and triangles in a run of its own");
     app.add_flag("--json", command->json, "Print one JSON object");
     add_common_options(app, command->common);
+    add_device_option(app, command->device);
     app.callback([command] { run(*command); });
 }
 

@@ -121,6 +121,12 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
         ->default_str("0");
 }
 
+void add_device_option(CLI::App& app, Named<Device>& device) {
+    add_name_option(app, "--device", "What traces", list_names(kDevices),
+                    [&](std::string_view name) { device = find_name("device", name, kDevices); })
+        ->default_str("cpu");
+}
+
 void add_camera_options(CLI::App& app, CameraOptions& options) {
     const auto add = [&](const char* flag, const char* help, auto take) {
         return app.add_option_function<std::string>(flag, take, help);

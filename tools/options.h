@@ -9,11 +9,16 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
 
 namespace packet::tools {
+
+/// What traces.
+enum class Device : std::uint8_t { kCpu, kCuda };
+inline constexpr Named<Device> kDevices[] = {{Device::kCpu, "cpu"}, {Device::kCuda, "cuda"}};
 
 struct CommonOptions {
     BuildOptions build;
@@ -28,5 +33,6 @@ CLI::Option* add_name_option(CLI::App& app, const std::string& flags, const std:
 // What these add writes into the second argument, which must outlive the parse.
 void add_common_options(CLI::App& app, CommonOptions& options);
 void add_camera_options(CLI::App& app, CameraOptions& options);
+void add_device_option(CLI::App& app, Named<Device>& device);
 
 }  // namespace packet::tools

@@ -59,7 +59,7 @@ void trace(const Sight& sight, std::vector<Path>& paths) {
     rays.reserve(paths.size());
     for (const Path& path : paths) rays.push_back(path.ray);
     std::vector<Hit> hits(rays.size());
-    trace_closest(sight.scene, rays, hits, sight.trace);
+    sight.tracer.closest(rays, hits);
     for (std::size_t i = 0; i < paths.size(); ++i) paths[i].hit = hits[i];
 }
 

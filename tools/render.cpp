@@ -57,13 +57,11 @@ private:
 }  // namespace
 
 Image render(const Scene& scene, const Camera& camera, const Shading& shading, int samples,
-             const TraceOptions& options) {
+             const Tracer& tracer) {
     const ImageSize size = camera.size();
     if (samples == 0) samples = shading.samples;
     const float weight = 1.0f / static_cast<float>(samples);
     const float distance = occlusion_distance(scene.bounds());
-    TraceOptions shading_options = options;
-    shading_options.threads = 1;  // the tiles are spread over the threads already
 
     std::vector<glm::vec3> image(size.pixel_count(), glm::vec3(0.0f));
     Progress progress("render", size.pixel_count() * static_cast<std::size_t>(samples));
@@ -73,16 +71,21 @@ Image render(const Scene& scene, const Camera& camera, const Shading& shading, i
         const auto consume = [&](Tile tile, std::span<const Ray> rays, std::span<const Hit> hits) {
             std::vector<Random> randoms = pass.shading_randoms(tile);
             std::vector<glm::vec3> colors(rays.size());
-            shading.shade({scene, distance, shading_options, rays, hits, randoms}, colors);
+            shading.shade({scene, distance, tracer, rays, hits, randoms}, colors);
             for_each_pixel(tile, size.width, [&](std::size_t pixel, std::size_t i, int, int) {
                 image[pixel] += weight * colors[i];
             });
             progress.advance(rays.size());
         };
-        trace_tiles(scene, size.width, size.height, generate, consume, options);
+        tracer.tiles(size.width, size.height, generate, consume);
     }
     shading.develop(image);
     return to_image(size, image);
+}
+
+Image render(const Scene& scene, const Camera& camera, const Shading& shading, int samples,
+             const TraceOptions& options) {
+    return render(scene, camera, shading, samples, CpuTracer(scene, options));
 }
 
 }  // namespace packet::tools

@@ -56,20 +56,17 @@ void shade_occlusion(const Sight& sight, std::span<glm::vec3> colors) {
         owners.push_back(i);
     }
     std::vector<std::uint8_t> occluded(rays.size());
-    trace_any(sight.scene, rays, occluded, sight.trace);
+    sight.tracer.any(rays, occluded);
     for (std::size_t i = 0; i < rays.size(); ++i) {
         colors[owners[i]] = glm::vec3(occluded[i] != 0 ? 0.0f : 1.0f);
     }
 }
 
 void shade_heat(const Sight& sight, std::span<glm::vec3> colors) {
-    TraceStats stats;
-    TraceOptions options = sight.trace;
-    options.stats = &stats;
     for (std::size_t i = 0; i < colors.size(); ++i) {
-        stats = {};
+        TraceStats stats;
         Hit hit;
-        trace_closest(sight.scene, sight.rays.subspan(i, 1), std::span(&hit, 1), options);
+        sight.tracer.closest(sight.rays.subspan(i, 1), std::span(&hit, 1), &stats);
         colors[i] = glm::vec3(static_cast<float>(stats.nodes));
     }
 }

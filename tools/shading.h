@@ -2,11 +2,11 @@
 #pragma once
 
 #include "random.h"
+#include "tracer.h"
 
 #include <packet/hit.h>
 #include <packet/ray.h>
 #include <packet/scene.h>
-#include <packet/trace.h>
 
 #include <glm/vec3.hpp>
 
@@ -19,7 +19,7 @@ namespace packet::tools {
 struct Sight {
     const Scene& scene;
     float occlusion_distance;
-    TraceOptions trace;  ///< for more rays, on this thread
+    const Tracer& tracer;  ///< for more rays
     std::span<const Ray> rays;
     std::span<const Hit> hits;
     std::span<Random> randoms;

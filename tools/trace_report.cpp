@@ -14,6 +14,7 @@ std::string to_json(const TraceReport& report) {
     nlohmann::ordered_json json;
     json["scene"] = {{"triangles", report.triangles}, {"instances", report.instances}};
     json["accel"] = to_string(report.accel);
+    json["device"] = report.device;
     json["mode"] = to_string(report.mode);
     json["isa"] = to_string(report.isa);
     json["threads"] = report.threads;

@@ -16,6 +16,7 @@ struct TraceReport {
     std::size_t triangles = 0;
     std::size_t instances = 0;
     AccelKind accel = AccelKind::kBvh;
+    std::string_view device = "cpu";
     Mode mode = Mode::kAuto;  ///< as asked for
     IsaId isa = IsaId::kScalar;
     int threads = 1;

@@ -17,11 +17,11 @@ struct Bounds3f {
         lower = glm::min(lower, point);
         upper = glm::max(upper, point);
     }
-    void extend(const Bounds3f& other) noexcept {
+    constexpr void extend(const Bounds3f& other) noexcept {
         lower = glm::min(lower, other.lower);
         upper = glm::max(upper, other.upper);
     }
-    [[nodiscard]] bool empty() const noexcept {
+    [[nodiscard]] constexpr bool empty() const noexcept {
         return !(lower.x <= upper.x && lower.y <= upper.y && lower.z <= upper.z);
     }
     [[nodiscard]] bool contains(const Bounds3f& other) const noexcept {
@@ -29,11 +29,11 @@ struct Bounds3f {
                other.upper.x <= upper.x && other.upper.y <= upper.y && other.upper.z <= upper.z;
     }
     [[nodiscard]] glm::vec3 center() const noexcept { return 0.5f * lower + 0.5f * upper; }
-    [[nodiscard]] glm::vec3 extent() const noexcept {
+    [[nodiscard]] constexpr glm::vec3 extent() const noexcept {
         return empty() ? glm::vec3(0.0f) : upper - lower;
     }
     /// Half the surface area, the measure of the surface area heuristic. Zero for an empty box.
-    [[nodiscard]] float half_area() const noexcept {
+    [[nodiscard]] constexpr float half_area() const noexcept {
         const glm::vec3 e = extent();
         return e.x * e.y + e.y * e.z + e.z * e.x;
     }

@@ -6,7 +6,7 @@
 // Karras. Maximizing parallelism in the construction of BVHs, octrees, and k-d trees. HPG 2012.
 #include "build/bvh_morton.h"
 
-#include "build/radix_tree.h"
+#include "build/radix_hierarchy.h"
 #include "build/split.h"
 #include "core/morton.h"
 #include "schedule/radix_sort.h"
@@ -24,13 +24,6 @@ constexpr std::size_t kGrain = 8192;
 // Of a build's time; the two loops over nodes take about as long as each other.
 constexpr double kShareOfSort = 0.5, kShareOfLoop = 0.25;
 
-/// What a node's parent needs to know of it beside its box.
-struct Subtree {
-    std::uint32_t first, count;  ///< the references it covers
-    float cost;                  ///< as in BuildStats::sah_cost, times the area of the root
-    int height;                  ///< edges to its deepest leaf
-};
-
 template <class Code>
 class Builder {
     using Item = MortonItem<Code>;
@@ -38,7 +31,7 @@ class Builder {
 public:
     Builder(AlignedVector<Reference> references, const BuildOptions& options,
             const Parallel& parallel)
-        : options_(options),
+        : rule_(options),
           parallel_(parallel),
           count_(references.size()),
           unsorted_(std::move(references)) {}
@@ -79,20 +72,22 @@ private:
         unsorted_ = {};
     }
 
-    /// Inner nodes have the slots below this, and leaf i has this one plus i.
-    [[nodiscard]] std::size_t first_leaf() const { return count_ - 1; }
-
     void build_nodes(int dropped_bits) {
         const RadixKeys<Code> keys(items_, dropped_bits);
+        const RadixHierarchy tree{nodes_.data(), parents_.data(), subtrees_.data(),
+                                  static_cast<std::uint32_t>(count_)};
         parallel_.for_pieces(count_ - 1, kGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
-                link(i, radix_node(keys, static_cast<std::uint32_t>(i)));
+                const auto slot = static_cast<std::uint32_t>(i);
+                tree.link(slot, radix_node(keys, slot));
             }
             advance(end - begin);
         });
         std::vector<std::atomic<std::uint8_t>> is_one_child_done(count_ - 1);
         parallel_.for_pieces(count_, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) climb(first_leaf() + i, is_one_child_done);
+            for (std::size_t i = begin; i < end; ++i) {
+                climb(tree, static_cast<std::uint32_t>(i), is_one_child_done);
+            }
             advance(end - begin);
         });
     }
@@ -101,65 +96,27 @@ private:
         parallel_.advance(kShareOfLoop * static_cast<double>(items) / static_cast<double>(count_));
     }
 
-    void link(std::size_t slot, const RadixNode& range) {
-        const std::size_t first =
-            range.split == range.first ? first_leaf() + range.split : range.split;
-        const std::size_t second =
-            range.split + 1 == range.last ? first_leaf() + range.last : range.split + 1;
-        nodes_[slot].first = static_cast<std::uint32_t>(first);
-        nodes_[slot].second = static_cast<std::uint32_t>(second);
-        nodes_[slot].count = 0;
-        parents_[first] = parents_[second] = static_cast<std::uint32_t>(slot);
-        subtrees_[slot].first = range.first;
-        subtrees_[slot].count = range.last - range.first + 1;
-    }
-
     /// Finishes a leaf, and those ancestors whose other descendants are finished.
-    void climb(std::size_t slot, std::span<std::atomic<std::uint8_t>> is_one_child_done) {
-        const std::size_t item = slot - first_leaf();
-        nodes_[slot].bounds = references_[item].bounds();
-        nodes_[slot].first = static_cast<std::uint32_t>(item);
-        nodes_[slot].count = 1;
+    void climb(const RadixHierarchy& tree, std::uint32_t item,
+               std::span<std::atomic<std::uint8_t>> is_one_child_done) {
+        tree.make_leaf(item, references_[item]);
+        std::uint32_t slot = tree.first_leaf() + item;
         while (slot != 0) {
-            slot = parents_[slot];
+            slot = tree.parents[slot];
             // Releases this child to the thread that comes second, or acquires the other child.
             if (is_one_child_done[slot].exchange(1, std::memory_order_acq_rel) == 0) return;
-            finish(nodes_[slot], subtrees_[slot]);
+            tree.finish(slot, rule_);
         }
     }
 
-    /// Fills the box of a node whose children are finished. It is a leaf if that is cheaper.
-    void finish(BuildNode& node, Subtree& subtree) const {
-        node.bounds = nodes_[node.first].bounds;
-        node.bounds.extend(nodes_[node.second].bounds);
-        const Subtree first = subtree_at(node.first), second = subtree_at(node.second);
-        const float area = node.bounds.half_area();
-        const float leaf_cost =
-            options_.intersection_cost * area * static_cast<float>(subtree.count);
-        subtree.cost = options_.traversal_cost * area + first.cost + second.cost;
-        subtree.height = 1 + std::max(first.height, second.height);
-        if (subtree.count > static_cast<std::uint32_t>(options_.max_leaf_size)) return;
-        if (subtree.cost < leaf_cost) return;
-        subtree.cost = leaf_cost;
-        subtree.height = 0;
-        node.first = subtree.first;
-        node.count = subtree.count;
-    }
-
-    [[nodiscard]] Subtree subtree_at(std::size_t slot) const {
-        if (slot < first_leaf()) return subtrees_[slot];
-        const float area = nodes_[slot].bounds.half_area();
-        return {nodes_[slot].first, 1, options_.intersection_cost * area, 0};
-    }
-
-    const BuildOptions& options_;
+    LeafRule rule_;
     const Parallel& parallel_;
     std::size_t count_;
     AlignedVector<Reference> unsorted_, references_;
     ScratchVector<Item> items_;
     ScratchVector<BuildNode> nodes_;
-    ScratchVector<std::uint32_t> parents_;  ///< by slot; the root has none
-    ScratchVector<Subtree> subtrees_;       ///< by slot, of inner nodes
+    ScratchVector<std::uint32_t> parents_;
+    ScratchVector<RadixSubtree> subtrees_;
 };
 
 /// The tree over one reference, or none.
@@ -170,19 +127,21 @@ Hierarchy build_trivial(AlignedVector<Reference> references) {
     return out;
 }
 
-/// Up to this, 30 bits do as well as 63 for evenly spread triangles (SAH cost within 0.1%, in
-/// terrain and city) and sort in half the passes. Kept well below where they differ, for uneven
-/// scenes.
-constexpr std::size_t kMostFor30Bits = 100000;
-
 }  // namespace
+
+int chosen_morton_bits(std::size_t references, const BuildOptions& options) {
+    // Up to this, 30 bits do as well as 63 for evenly spread triangles (SAH cost within 0.1%, in
+    // terrain and city) and sort in half the passes. Kept well below where they differ, for uneven
+    // scenes.
+    constexpr std::size_t kMostFor30Bits = 100000;
+    if (options.morton_bits != 0) return options.morton_bits;
+    return references <= kMostFor30Bits ? 30 : 63;
+}
 
 Hierarchy build_bvh_morton(AlignedVector<Reference> references, const BuildOptions& options,
                            const Parallel& parallel) {
     if (references.size() < 2) return build_trivial(std::move(references));
-    const int bits = options.morton_bits != 0              ? options.morton_bits
-                     : references.size() <= kMostFor30Bits ? 30
-                                                           : 63;
+    const int bits = chosen_morton_bits(references.size(), options);
     Hierarchy out;
     parallel.run([&] {
         if (bits == 30) {

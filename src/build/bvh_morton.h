@@ -16,4 +16,7 @@ namespace packet {
 [[nodiscard]] Hierarchy build_bvh_morton(AlignedVector<Reference> references,
                                          const BuildOptions& options, const Parallel& parallel);
 
+/// How many bits the codes of so many references have: 30 or 63.
+[[nodiscard]] int chosen_morton_bits(std::size_t references, const BuildOptions& options);
+
 }  // namespace packet

@@ -16,7 +16,7 @@ struct BuildNode {
     std::uint32_t second = 0;  ///< inner: index of the second child
     std::uint32_t count = 0;
 
-    [[nodiscard]] bool is_leaf() const noexcept { return count != 0; }
+    [[nodiscard]] constexpr bool is_leaf() const noexcept { return count != 0; }
     [[nodiscard]] std::uint32_t& child(int side) noexcept { return side == 0 ? first : second; }
 };
 

@@ -30,8 +30,19 @@ struct RadixNode {
     friend bool operator==(const RadixNode&, const RadixNode&) = default;
 };
 
-/// Sorted codes, made distinct: equal ones are told apart by the bits of their position. The low
-/// `dropped_bits` of the codes are taken as equal.
+/// How many leading bits keys i and j have in common. Keys are codes, of which the low
+/// `dropped_bits` are taken as equal, and then the bits of their position, which tell equal codes
+/// apart.
+template <class Code>
+[[nodiscard]] constexpr int common_bits(Code code_i, Code code_j, std::int64_t i, std::int64_t j,
+                                        int dropped_bits) noexcept {
+    constexpr int kCodeBits = 8 * sizeof(Code);
+    const Code difference = (code_i ^ code_j) >> dropped_bits;
+    if (difference != 0) return std::countl_zero(difference);
+    return kCodeBits + std::countl_zero(static_cast<std::uint32_t>(i ^ j));
+}
+
+/// Sorted keys.
 template <class Code>
 class RadixKeys {
 public:
@@ -40,17 +51,13 @@ public:
 
     [[nodiscard]] std::size_t size() const noexcept { return sorted_.size(); }
 
-    /// How many leading bits keys i and j have in common; -1 if there is no j.
+    /// -1 if there is no j.
     [[nodiscard]] int common_bits(std::int64_t i, std::int64_t j) const noexcept {
         if (j < 0 || j >= static_cast<std::int64_t>(size())) return -1;
-        const Code difference = (code(i) ^ code(j)) >> dropped_bits_;
-        if (difference != 0) return std::countl_zero(difference);
-        return kCodeBits + std::countl_zero(static_cast<std::uint32_t>(i ^ j));
+        return packet::common_bits(code(i), code(j), i, j, dropped_bits_);
     }
 
 private:
-    static constexpr int kCodeBits = 8 * sizeof(Code);
-
     [[nodiscard]] Code code(std::int64_t i) const noexcept {
         return sorted_[static_cast<std::size_t>(i)].code;
     }
@@ -67,9 +74,10 @@ private:
     return std::max(0, code_bits + static_cast<int>(std::bit_width(n - 1)) - kMaxDepth);
 }
 
-/// Inner node i of the n - 1 over n keys; node 0 is the root, over all. O(log n).
-template <class Code>
-[[nodiscard]] RadixNode radix_node(const RadixKeys<Code>& keys, std::uint32_t index) noexcept {
+/// Inner node i of the n - 1 over n keys; node 0 is the root, over all. O(log n). `Keys` has
+/// common_bits() as RadixKeys.
+template <class Keys>
+[[nodiscard]] constexpr RadixNode radix_node(const Keys& keys, std::uint32_t index) noexcept {
     const std::int64_t i = index;
     // The range extends from i to the side whose neighbour has more in common with it.
     const std::int64_t d = keys.common_bits(i, i + 1) > keys.common_bits(i, i - 1) ? 1 : -1;

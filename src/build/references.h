@@ -18,7 +18,7 @@ struct Reference {
     glm::vec3 upper;
     std::uint32_t unused = 0;
 
-    [[nodiscard]] Bounds3f bounds() const noexcept { return {lower, upper}; }
+    [[nodiscard]] constexpr Bounds3f bounds() const noexcept { return {lower, upper}; }
 };
 static_assert(sizeof(Reference) == 32);
 

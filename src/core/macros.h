@@ -5,7 +5,15 @@
 
 // Kernels are only fast, and their objects only hold symbols of their own ISA, if the small
 // functions they are made of leave no copy behind.
+// By nvcc they are compiled for both sides, so that a device runs the very arithmetic that the CPU's
+// tests hold to its word.
+#if defined(__CUDACC__)
+#define PACKET_INLINE __host__ __device__ __forceinline__
+#define PACKET_NOINLINE __host__ __device__ __noinline__
+#else
 #define PACKET_INLINE [[gnu::always_inline]] inline
+#define PACKET_NOINLINE [[gnu::noinline]]
+#endif
 
 // Misuse of an interface, as opposed to bad data, which throws Error.
 #define PACKET_ASSERT(condition) assert(condition)

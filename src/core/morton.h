@@ -60,7 +60,7 @@ public:
         scale_ = std::isfinite(scale) ? scale : 0.0f;
     }
     /// The code of a finite point in the box.
-    [[nodiscard]] Code code(const glm::vec3& point) const noexcept {
+    [[nodiscard]] constexpr Code code(const glm::vec3& point) const noexcept {
         const glm::vec3 cell = (point - origin_) * scale_;
         return interleave(clamp(cell.x), clamp(cell.y), clamp(cell.z));
     }
@@ -68,7 +68,7 @@ public:
 private:
     static constexpr std::int32_t kCells = 1 << (kMortonBits<Code> / 3);
 
-    static Code clamp(float cell) noexcept {
+    static constexpr Code clamp(float cell) noexcept {
         return static_cast<Code>(std::min(static_cast<std::int32_t>(cell), kCells - 1));
     }
 

@@ -24,7 +24,7 @@ struct Node {
     std::uint32_t link;   ///< inner: index of the second child; leaf: its first item
     std::uint32_t count;  ///< inner: 0; leaf: how many items
 
-    [[nodiscard]] bool is_leaf() const noexcept { return count != 0; }
+    [[nodiscard]] constexpr bool is_leaf() const noexcept { return count != 0; }
 };
 static_assert(sizeof(Node) == 32 && std::is_trivially_copyable_v<Node>);
 
@@ -36,7 +36,7 @@ struct WideChild {
     std::uint32_t link;   ///< inner: index of its node; leaf: its first item
     std::uint32_t count;  ///< inner: 0; leaf: how many items
 
-    [[nodiscard]] bool is_leaf() const noexcept { return count != 0; }
+    [[nodiscard]] constexpr bool is_leaf() const noexcept { return count != 0; }
 };
 
 /// A node of the 8-wide form of a tree. Its children's boxes are a structure of arrays. Children
@@ -107,10 +107,10 @@ struct TreeView {
     float slack = kBoxSlack;
     float reach = 0.0f;
 
-    [[nodiscard]] bool is_tree() const noexcept {
+    [[nodiscard]] constexpr bool is_tree() const noexcept {
         return node_count != 0 && grid.bricks == nullptr;
     }
-    [[nodiscard]] bool is_empty() const noexcept {
+    [[nodiscard]] constexpr bool is_empty() const noexcept {
         return node_count == 0 && grid.bricks == nullptr;
     }
 };

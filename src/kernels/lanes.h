@@ -63,6 +63,11 @@ PACKET_INLINE int count(Mask<N, Isa> m) {
     return __builtin_popcount(m.bits());
 }
 
+/// The number of the lowest bit set; `bits` is not 0. (ffs, since nvcc has no ctz for the device.)
+PACKET_INLINE int lowest_bit(std::uint32_t bits) {
+    return __builtin_ffs(static_cast<int>(bits)) - 1;
+}
+
 /// What Float and Int share: loading, storing, comparing, choosing.
 template <class Self, class T, int N, class Isa>
 struct LaneValues {

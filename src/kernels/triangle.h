@@ -61,10 +61,10 @@ struct StoredHits {
 /// Recomputes the edge functions of the lanes in `bits` so that zero means zero. Rare: rays that
 /// pass an edge or a corner as closely as float can tell.
 template <int N, class Isa>
-[[gnu::noinline]] void decide_edges(const StoredCorners<N>& p, std::uint32_t bits,
+PACKET_NOINLINE void decide_edges(const StoredCorners<N>& p, std::uint32_t bits,
                                     StoredEdges<N>& e) {
     for (; bits != 0; bits &= bits - 1) {
-        const int i = __builtin_ctz(bits);
+        const int i = lowest_bit(bits);
         e.u[i] = exact_sign_difference(p.x[2][i], p.y[1][i], p.y[2][i], p.x[1][i]);
         e.v[i] = exact_sign_difference(p.x[0][i], p.y[2][i], p.y[0][i], p.x[2][i]);
         e.w[i] = exact_sign_difference(p.x[1][i], p.y[0][i], p.y[1][i], p.x[0][i]);
@@ -88,10 +88,10 @@ PACKET_INLINE Mask<N, Isa> is_ill_conditioned(const Float3<N, Isa> (&p)[3],
 
 /// t, u and v of the lanes in `bits`, in double from the sheared corners.
 template <int N, class Isa>
-[[gnu::noinline]] void refine_hits(const StoredCorners<N>& p, std::uint32_t bits,
+PACKET_NOINLINE void refine_hits(const StoredCorners<N>& p, std::uint32_t bits,
                                    StoredHits<N>& hits) {
     for (; bits != 0; bits &= bits - 1) {
-        const int i = __builtin_ctz(bits);
+        const int i = lowest_bit(bits);
         const auto edge = [&](int a, int b) {  // exact products, one rounding
             return static_cast<double>(p.x[a][i]) * p.y[b][i] -
                    static_cast<double>(p.y[a][i]) * p.x[b][i];

@@ -1,0 +1,93 @@
+// Owners of what the CUDA runtime hands out, and its errors as packet::Error.
+#pragma once
+
+#include "device.h"
+
+#include <packet/error.h>
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <utility>
+
+namespace packet::cuda {
+
+/// Throws Error{kUnsupported} that says what failed and why.
+inline void check(cudaError_t error, const char* what) {
+    if (error == cudaSuccess) return;
+    throw Error(ErrorCode::kUnsupported,
+                std::string("CUDA: ") + what + ": " + cudaGetErrorString(error));
+}
+
+/// Of the device in use.
+[[nodiscard]] inline int device_attribute(cudaDeviceAttr which) {
+    int device = 0, value = 0;
+    check(cudaGetDevice(&device), "cudaGetDevice");
+    check(cudaDeviceGetAttribute(&value, which, device), "cudaDeviceGetAttribute");
+    return value;
+}
+
+class Stream {
+public:
+    Stream() { check(cudaStreamCreate(&stream_), "cudaStreamCreate"); }
+    ~Stream() { cudaStreamDestroy(stream_); }
+    Stream(const Stream&) = delete;
+    Stream& operator=(const Stream&) = delete;
+
+    [[nodiscard]] cudaStream_t get() const noexcept { return stream_; }
+    /// Waits for all that has been put into it.
+    void synchronize() const { check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize"); }
+
+private:
+    cudaStream_t stream_ = nullptr;
+};
+
+/// Memory of the device, not initialised.
+template <class T>
+class DeviceArray {
+public:
+    DeviceArray() = default;
+    explicit DeviceArray(std::size_t count) : count_(count) {
+        if (count != 0) check(cudaMalloc(&data_, count * sizeof(T)), "cudaMalloc");
+    }
+    /// With these values. The span may go as soon as this returns.
+    explicit DeviceArray(std::span<const T> values) : DeviceArray(values.size()) {
+        const Stream stream;
+        copy_from(values, stream.get());
+        stream.synchronize();
+    }
+    ~DeviceArray() { cudaFree(data_); }
+    DeviceArray(DeviceArray&& other) noexcept
+        : data_(std::exchange(other.data_, nullptr)), count_(std::exchange(other.count_, 0)) {}
+    DeviceArray& operator=(DeviceArray&& other) noexcept {
+        std::swap(data_, other.data_);
+        std::swap(count_, other.count_);
+        return *this;
+    }
+
+    [[nodiscard]] T* data() const noexcept { return data_; }
+    [[nodiscard]] std::size_t size() const noexcept { return count_; }
+
+    // These are done in the stream's order; what is on the host must stay until then.
+    void copy_from(std::span<const T> values, cudaStream_t stream) {
+        if (values.empty()) return;
+        check(cudaMemcpyAsync(data_, values.data(), values.size_bytes(), cudaMemcpyHostToDevice,
+                              stream),
+              "copy to the device");
+    }
+    void copy_to(std::span<T> values, cudaStream_t stream) const {
+        if (values.empty()) return;
+        check(cudaMemcpyAsync(values.data(), data_, values.size_bytes(), cudaMemcpyDeviceToHost,
+                              stream),
+              "copy from the device");
+    }
+    void fill_bytes(int byte, cudaStream_t stream) {
+        check(cudaMemsetAsync(data_, byte, count_ * sizeof(T), stream), "cudaMemset");
+    }
+
+private:
+    T* data_ = nullptr;
+    std::size_t count_ = 0;
+};
+
+}  // namespace packet::cuda

@@ -1,0 +1,37 @@
+// The device that tests of CUDA run on: the machine's, or one that is emulated on the CPU.
+#pragma once
+
+#include <packet/cuda.h>
+#include <packet/error.h>
+
+#if defined(PACKET_EMULATED)
+#include "emulation/grid.h"
+#endif
+
+#include <iostream>
+
+namespace packet::test {
+
+/// Whether to go on; else says that the test was skipped. ctest takes the line for that.
+[[nodiscard]] inline bool has_device() {
+    try {
+        (void)cuda::device_name();
+        return true;
+    } catch (const Error& error) {
+        std::cout << "skipped: " << error.what() << "\n";
+        return false;
+    }
+}
+
+// Orders in which threads run: those that the emulation has, or the one that a device chooses.
+#if defined(PACKET_EMULATED)
+inline constexpr int kThreadOrders = 3;
+inline void set_thread_order(int order) {
+    emulation::set_order(static_cast<emulation::Order>(order), 11);
+}
+#else
+inline constexpr int kThreadOrders = 1;
+inline void set_thread_order(int) {}
+#endif
+
+}  // namespace packet::test
