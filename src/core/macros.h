@@ -5,8 +5,8 @@
 
 // Kernels are only fast, and their objects only hold symbols of their own ISA, if the small
 // functions they are made of leave no copy behind.
-// By nvcc they are compiled for both sides, so that a device runs the very arithmetic that the CPU's
-// tests hold to its word.
+// By nvcc they are compiled for both sides, so that a device runs the very arithmetic that the
+// CPU's tests hold to its word.
 #if defined(__CUDACC__)
 #define PACKET_INLINE __host__ __device__ __forceinline__
 #define PACKET_NOINLINE __host__ __device__ __noinline__

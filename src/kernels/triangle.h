@@ -62,7 +62,7 @@ struct StoredHits {
 /// pass an edge or a corner as closely as float can tell.
 template <int N, class Isa>
 PACKET_NOINLINE void decide_edges(const StoredCorners<N>& p, std::uint32_t bits,
-                                    StoredEdges<N>& e) {
+                                  StoredEdges<N>& e) {
     for (; bits != 0; bits &= bits - 1) {
         const int i = lowest_bit(bits);
         e.u[i] = exact_sign_difference(p.x[2][i], p.y[1][i], p.y[2][i], p.x[1][i]);
@@ -89,7 +89,7 @@ PACKET_INLINE Mask<N, Isa> is_ill_conditioned(const Float3<N, Isa> (&p)[3],
 /// t, u and v of the lanes in `bits`, in double from the sheared corners.
 template <int N, class Isa>
 PACKET_NOINLINE void refine_hits(const StoredCorners<N>& p, std::uint32_t bits,
-                                   StoredHits<N>& hits) {
+                                 StoredHits<N>& hits) {
     for (; bits != 0; bits &= bits - 1) {
         const int i = lowest_bit(bits);
         const auto edge = [&](int a, int b) {  // exact products, one rounding
