@@ -31,9 +31,9 @@ constexpr std::array kModeNames = {
 constexpr std::size_t kRaysPerTask = 512;
 // Fewer, of 24 classes, make streams of few rays: docs/benchmarking.md#streams.
 constexpr std::size_t kLeastRaysForStreams = 1024;
-// Rays that look coherent go by tiles, which seldom lose. For the others, if there are enough,
-// auto tries packets of 16 beside single rays: short rays gain by them. Packets of 8 never won by
-// much. It does so this many times, each time on neighbouring tasks,
+// For closest-hit, rays that look coherent go by tiles, which seldom lose. For the others, if there
+// are enough, auto tries packets of 16 beside single rays: short rays gain by them. Packets of 8
+// never won by much. It does so this many times, each time on neighbouring tasks,
 constexpr std::size_t kTrialPairs = 5;
 // if that is so little of the whole that the slower tries do not count.
 constexpr std::size_t kLeastTasksForTrial = 128;
@@ -111,13 +111,17 @@ bool has_one_tree(const SceneView& scene) {
     return scene.is_single_mesh && scene.instances[0].tree->is_tree();
 }
 
-/// What the rays are traced by: as asked for, or as they suggest.
-Mode resolve_mode(const SceneAccel& scene, std::span<const Ray> rays, Mode asked) {
+enum class Query { kClosest, kAny };
+
+/// What the rays are traced by: as asked for, or as they and the query suggest. Rays that look for
+/// any hit go by streams even if they cohere: docs/benchmarking.md#streams.
+Mode resolve_mode(const SceneAccel& scene, std::span<const Ray> rays, Query query, Mode asked) {
     if (asked == Mode::kStream && !has_one_tree(scene.view)) return Mode::kSingle;
     if (asked != Mode::kAuto) return asked;
+    const bool may_stream = rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
+    if (may_stream && query == Query::kAny) return Mode::kStream;
     const Mode mode = choose_mode(rays, scene.top.bounds);
-    const bool are_many = rays.size() >= kLeastRaysForStreams;
-    return mode == Mode::kSingle && are_many && has_one_tree(scene.view) ? Mode::kStream : mode;
+    return may_stream && mode == Mode::kSingle ? Mode::kStream : mode;
 }
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
@@ -125,11 +129,12 @@ class SpanTrace {
 public:
     using Kernels = KernelTable::Batch[KernelTable::kKernelCount][KernelTable::kCountingCount];
 
-    SpanTrace(const Scene& scene, std::span<const Ray> rays, const TraceOptions& options)
+    SpanTrace(const Scene& scene, std::span<const Ray> rays, Query query,
+              const TraceOptions& options)
         : scene_(scene.accel()),
           options_(options),
           parallel_(options.threads),
-          mode_(resolve_mode(scene_, rays, options.mode)),
+          mode_(resolve_mode(scene_, rays, query, options.mode)),
           tasks_(mode_ == Mode::kStream ? Tasks(rays, scene_.top.bounds, parallel_.threads())
                                         : Tasks(rays, options.width)),
           tries_(options.mode == Mode::kAuto && mode_ == Mode::kSingle &&
@@ -243,14 +248,14 @@ double TraceStats::lane_utilization() const noexcept { return ratio(lanes_active
 void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                    const TraceOptions& options) {
     check_sizes(rays.size(), hits.size(), "hits");
-    const SpanTrace trace(scene, rays, options);
+    const SpanTrace trace(scene, rays, Query::kClosest, options);
     trace.run(select_kernels(options.isa).closest, hits.data(), nullptr);
 }
 
 void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size(), "results");
-    const SpanTrace trace(scene, rays, options);
+    const SpanTrace trace(scene, rays, Query::kAny, options);
     trace.run(select_kernels(options.isa).any, nullptr, occluded.data());
 }
 
