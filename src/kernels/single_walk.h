@@ -63,11 +63,11 @@ public:
     }
     /// The nearest subtree that begins before `best_t`; false if there is none.
     PACKET_INLINE bool pop(float best_t, WideChild& out) {
-        const Entry* entry = top_;
-        while (entry->enter > best_t) --entry;  // ends at the lowest, which begins before all
-        top_ = const_cast<Entry*>(entry) - 1;
-        out = entry->child;
-        return entry != entries_;
+        while (top_->enter > best_t) --top_;  // ends at the lowest, which begins before all
+        if (top_ == entries_) return false;
+        out = top_->child;
+        --top_;
+        return true;
     }
 
 private:
