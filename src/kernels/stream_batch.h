@@ -24,6 +24,7 @@ public:
             const int most = left < kStreamRays ? static_cast<int>(left) : kStreamRays;
             const RayColumns columns = gather_rays(batch_, begin, most, gathered_);
             const int count = run_length(columns.component + 4, most);
+            prefetch_rays(batch_, begin + static_cast<std::size_t>(count), kStreamRays);
             trace_stream(columns, begin, count);
             begin += static_cast<std::size_t>(count);
         }

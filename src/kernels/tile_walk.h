@@ -80,6 +80,7 @@ private:
         const int bottom = size_;
         for (; bits != 0; bits &= bits - 1) {
             const int child = __builtin_ctz(bits);
+            prefetch(tree_, node.child[child]);
             int place = size_++;
             if constexpr (query == Query::kClosest) {
                 for (; place > bottom && stack_[place - 1].depth < depth[child]; --place) {
