@@ -37,14 +37,14 @@ TEST_CASE("rays are sorted by class, then by origin") {
     StreamOrder order;
     for (const std::size_t count : {std::size_t{1}, std::size_t{777}, StreamOrder::kMostRays}) {
         const std::vector<Ray> rays = random_rays(world, count, 5);
-        const auto sorted = order.sort(rays, world);
+        const auto sorted = order.sort(rays);
         std::vector<std::uint32_t> all(sorted.begin(), sorted.end()), want(count);
         CHECK(std::ranges::is_sorted(all, {}, [&](auto i) { return class_of(rays[i]); }));
         std::ranges::sort(all);
         std::iota(want.begin(), want.end(), 0u);
         CHECK(all == want);
     }
-    CHECK(order.sort({}, world).empty());
+    CHECK(order.sort({}).empty());
 }
 
 TEST_CASE("rays that follow each other start near each other") {
@@ -52,7 +52,7 @@ TEST_CASE("rays that follow each other start near each other") {
     std::vector<Ray> rays = random_rays(world, 20000, 6);
     for (Ray& ray : rays) ray.dir = {0, 0, 1};
     StreamOrder order;
-    const auto sorted = order.sort(rays, world);
+    const auto sorted = order.sort(rays);
     float way = 0, sorted_way = 0;
     for (std::size_t i = 1; i < rays.size(); ++i) {
         way += glm::distance(rays[i].org, rays[i - 1].org);
@@ -69,7 +69,7 @@ TEST_CASE("origins that are no points, far away, or in a flat world") {
     StreamOrder order;
     for (const Bounds3f& world : {Bounds3f{{0, 0, 0}, {1, 1, 1}}, Bounds3f{{0, 0, 0}, {0, 0, 0}},
                                   Bounds3f{{-1.8e18f, 0, 0}, {1.8e18f, 0, 1e-40f}}}) {
-        const auto sorted = order.sort(rays, world);
+        const auto sorted = order.sort(rays);
         CHECK(std::accumulate(sorted.begin(), sorted.end(), 0u) == 15);
     }
 }

@@ -54,6 +54,11 @@ struct BestHits {
             instance_id = select(closer, I(instance), instance_id);
         }
     }
+    /// A hit of one lane.
+    template <Query query, class Hit>
+    PACKET_INLINE void update(const Hit& hit, std::int32_t instance, std::uint32_t lane_bit = 1) {
+        update<query>(M::from_bits(lane_bit), hit.t, hit.u, hit.v, hit.prim_id, instance);
+    }
     PACKET_INLINE M found() const { return prim_id < I(kNoId); }
 };
 

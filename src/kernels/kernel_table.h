@@ -36,7 +36,8 @@ struct KernelTable {
     using Overlap8 = std::uint32_t (*)(const float (&triangle)[3][3], const float (&lower)[3][8],
                                        const float (&upper)[3][8]) noexcept;
 
-    enum Kernel { kSingle, kPacket8, kPacket16, kTile, kStream, kKernelCount };
+    /// kSorted: as kStream; any-hit rays go by tiles where these are full.
+    enum Kernel { kSingle, kPacket8, kPacket16, kTile, kStream, kSorted, kKernelCount };
     enum Counting { kNotCounting, kCounting, kCountingCount };
 
     Batch closest[kKernelCount][kCountingCount];

@@ -71,13 +71,35 @@ PACKET_INLINE int nearest_lane(std::uint32_t bits, const float* t, const std::in
     return nearest;
 }
 
-/// A single ray meets all blocks of a range at once. Other leaves'
-/// triangles in the same block are met along: they are triangles like any other.
+/// A ray's nearest hit among the triangles of a block.
+struct BlockHit {
+    float t, u, v;
+    std::int32_t prim_id;
+};
+
+/// A ray meets the triangles of a block, all at once. Those that belong to other leaves are met
+/// along: they are triangles like any other. Calls take(hit) if it hits any.
+template <class Isa, class Take>
+PACKET_INLINE void meet_block(const ShearRays<kBlockSize, Isa>& shear_ray, const SingleRay& ray,
+                              const float& best_t, const TriangleBlock& block, Take&& take) {
+    const BlockTriangles triangles{block};
+    const auto sheared = shear<Directions::kShared>(shear_ray, triangles);
+    const auto candidates = sheared.may_hit();
+    if (none(candidates)) return;
+    const TriangleHits<kBlockSize, Isa> hits =
+        decide_hits(sheared, SingleHitRay<kBlockSize, Isa>(ray), Float<kBlockSize, Isa>(best_t),
+                    candidates, triangles);
+    const std::uint32_t bits = hits.hit.bits();
+    if (bits == 0) return;
+    float t[kBlockSize], u[kBlockSize], v[kBlockSize];
+    hits.t.store(t), hits.u.store(u), hits.v.store(v);
+    const int i = nearest_lane(bits, t, block.prim_id);
+    take(BlockHit{t[i], u[i], v[i], block.prim_id[i]});
+}
+
+/// A single ray meets the blocks of a range.
 template <Query query, class Isa>
 struct SingleLeaf {
-    using F = Float<kBlockSize, Isa>;
-    using M = Mask<kBlockSize, Isa>;
-
     const TreeView& tree;
     const SingleRay& ray;
     std::int32_t instance_id;
@@ -85,27 +107,10 @@ struct SingleLeaf {
 
     PACKET_INLINE void meet(BlockRange range) const {
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            const TriangleBlock& block = tree.blocks[b];
-            const auto sheared = shear<Directions::kShared>(shear_of<kBlockSize, Isa>(opaque(ray)),
-                                                            BlockTriangles{block});
-            const M candidates = sheared.may_hit();
-            if (none(candidates)) continue;
-            take(block, decide_hits(sheared, SingleHitRay<kBlockSize, Isa>(ray), F(best.t.r[0]),
-                                    candidates, BlockTriangles{block}));
+            meet_block(shear_of<kBlockSize, Isa>(opaque(ray)), ray, best.t.r[0], tree.blocks[b],
+                       [&](const BlockHit& hit) { best.template update<query>(hit, instance_id); });
             if (query == Query::kAny && best.t.r[0] == kNever) return;
         }
-    }
-
-    /// Keeps the nearest.
-    PACKET_INLINE void take(const TriangleBlock& block,
-                            const TriangleHits<kBlockSize, Isa>& hits) const {
-        const std::uint32_t bits = hits.hit.bits();
-        if (bits == 0) return;
-        float t[kBlockSize], u[kBlockSize], v[kBlockSize];
-        hits.t.store(t), hits.u.store(u), hits.v.store(v);
-        const int i = nearest_lane(bits, t, block.prim_id);
-        best.template update<query>(Mask<1, Isa>::from_bits(1), t[i], u[i], v[i], block.prim_id[i],
-                                    instance_id);
     }
 };
 

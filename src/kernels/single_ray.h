@@ -72,6 +72,33 @@ PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLan
     }
 }
 
+/// What the triangle test needs of a packet whose rays share their directions, by lanes from
+/// `first` on.
+template <int N, class Isa>
+PACKET_INLINE void store_lanes(const PreparedRays<N, Isa>& from,
+                               PreparedLanes (&out)[N / kSingleLanes]) {
+    using L = PreparedLanes;
+    float lanes[N];
+    const auto store = [&](const Float<N, Isa>& number, int which) {
+        number.store(lanes);
+        for (int i = 0; i < N; ++i)
+            out[i / kSingleLanes].number[which][i % kSingleLanes] = lanes[i];
+    };
+    store(from.hit.tnear, L::kTnear);
+    store(from.shear.shear_x, L::kShearX);
+    store(from.shear.shear_y, L::kShearY);
+    store(from.hit.scale_z, L::kScaleZ);
+    for (int a = 0; a < 3; ++a) {
+        store(from.shear.org[a], L::kShearOrg + a);
+        store(from.hit.org[0][a], L::kLowerOrg + a);
+        store(from.hit.org[1][a], L::kUpperOrg + a);
+        store(from.hit.reciprocal[a], L::kReciprocal + a);
+        for (PreparedLanes& some : out) {
+            for (int i = 0; i < kSingleLanes; ++i) some.index[L::kAxis + a][i] = from.shear.axis[a];
+        }
+    }
+}
+
 /// The lanes of a packet, some at a time.
 template <int N, class Isa>
 PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<N, Isa>& ray,

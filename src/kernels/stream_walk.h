@@ -207,13 +207,12 @@ private:
                 const int r = __builtin_ctzll(left);
                 if (query == Query::kClosest && enter > rays.ray[r].best_t) continue;
                 stats_.triangles(__builtin_popcount(range.lanes(b)));
-                meet_block(rays, r, tree_.blocks[b]);
+                meet_ray(rays, r, tree_.blocks[b]);
             }
         }
     }
 
-    /// As SingleLeaf does.
-    PACKET_INLINE void meet_block(StreamRays<Isa>& rays, int r, const TriangleBlock& block) {
+    PACKET_INLINE void meet_ray(StreamRays<Isa>& rays, int r, const TriangleBlock& block) {
         StreamRay& ray = rays.ray[r];
         ShearRays<kBlockSize, Isa> shear;
         for (int a = 0; a < 3; ++a) {
@@ -222,16 +221,12 @@ private:
         }
         shear.shear_x = ray.shear_x;
         shear.shear_y = ray.shear_y;
-        const auto sheared = packet::shear<Directions::kShared>(shear, BlockTriangles{block});
-        const auto candidates = sheared.may_hit();
-        if (none(candidates)) return;
-        const SingleRay single = rays.single(r);
-        BestHits<1, Isa>& best = rays.best[r];
-        SingleLeaf<query, Isa>{tree_, single, instance_id_, best}.take(
-            block, decide_hits(sheared, SingleHitRay<kBlockSize, Isa>(single), F(ray.best_t),
-                               candidates, BlockTriangles{block}));
-        ray.best_t = best.t.r[0];
-        if (query == Query::kAny && ray.best_t == kNever) looking_ &= ~(RaySet{1} << r);
+        meet_block(shear, rays.single(r), ray.best_t, block, [&](const BlockHit& hit) {
+            BestHits<1, Isa>& best = rays.best[r];
+            best.template update<query>(hit, instance_id_);
+            ray.best_t = best.t.r[0];
+            if (query == Query::kAny) looking_ &= ~(RaySet{1} << r);
+        });
     }
 
     const TreeView& tree_;

@@ -20,6 +20,7 @@ struct TileTracer {
     const PreparedRays<N, Isa>* rays;
     BestHits<N, Isa>* best;
     std::uint32_t active;  ///< packets with a lane to trace
+    TileUse& use;
     Stats& stats;
     Singly& singly;  ///< traces the rays of one packet
 
@@ -57,7 +58,7 @@ private:
         const bool is_narrow = bounds.width(length < way ? length : way) <= kWidestBeam * way;
         if (!bounds.is_sound || !is_narrow) return false;
         TileWalk<query, N, Isa, Stats> walk(tree, rays + first, best + first, bounds, instance_id,
-                                            stats);
+                                            use, stats);
         const std::uint32_t all = (1u << (last - first)) - 1;
         walk.run(active >> first & all);
         return true;

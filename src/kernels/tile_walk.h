@@ -31,6 +31,11 @@ struct TileEntry {
     float depth;
 };
 
+/// How full the packets of tiles are where they meet boxes: whether walking in tiles pays.
+struct TileUse {
+    std::uint32_t packets = 0, lanes = 0;
+};
+
 /// The packets of a tile that walk together. Their directions are shared.
 template <Query query, int N, class Isa, class Stats>
 class TileWalk {
@@ -40,12 +45,13 @@ public:
 
     PACKET_INLINE TileWalk(const TreeView& tree, const PreparedRays<N, Isa>* rays,
                            BestHits<N, Isa>* best, const BeamBounds& bounds,
-                           std::int32_t instance_id, Stats& stats)
+                           std::int32_t instance_id, TileUse& use, Stats& stats)
         : tree_(tree),
           rays_(rays),
           best_(best),
           beam_(bounds),
           instance_id_(instance_id),
+          use_(use),
           stats_(stats) {
         for (int a = 0; a < 3; ++a) near_side_[a] = rays[0].near_side[a];
     }
@@ -124,6 +130,10 @@ private:
             const M active = planes.meets(rays_[p], best_[p].t);
             if (none(active)) continue;
             active_[p] = active;
+            if constexpr (query == Query::kAny) {
+                use_.lanes += static_cast<std::uint32_t>(count(active));
+                ++use_.packets;
+            }
             out |= 1u << p;
             if (!entry.node->child[entry.child].is_leaf()) stats_.visit(count(active), N);
         }
@@ -138,6 +148,10 @@ private:
             for (std::uint32_t left = packets; left != 0; left &= left - 1) {
                 const int p = __builtin_ctz(left);
                 stats_.triangles(count(active_[p]) * __builtin_popcount(triangles));
+                if (count(active_[p]) < __builtin_popcount(triangles)) {
+                    meet_by_rays(block, p);
+                    continue;
+                }
                 const PacketLeaf<query, Directions::kShared, N, Isa> leaf{tree_, rays_[p],
                                                                           instance_id_, best_[p]};
                 leaf.meet(block, triangles, active_[p]);
@@ -151,15 +165,37 @@ private:
         }
     }
 
+    /// The active rays of a packet meet a block one by one, each all of its triangles at once.
+    PACKET_NOINLINE void meet_by_rays(const TriangleBlock& block, int p) {
+        if ((stored_ >> p & 1u) == 0) {
+            stored_ |= 1u << p;
+            store_lanes(rays_[p], lanes_[p]);
+        }
+        float best_t[N];
+        best_[p].t.store(best_t);
+        for (std::uint32_t left = active_[p].bits(); left != 0; left &= left - 1) {
+            const int r = __builtin_ctz(left);
+            if (query == Query::kAny && best_t[r] == kNever) continue;
+            const SingleRay ray(lanes_[p][r / kSingleLanes], r % kSingleLanes);
+            meet_block(shear_of<kBlockSize, Isa>(ray), ray, best_t[r], block,
+                       [&](const BlockHit& hit) {
+                           best_[p].template update<query>(hit, instance_id_, 1u << r);
+                       });
+        }
+    }
+
     const TreeView& tree_;
     const PreparedRays<N, Isa>* rays_;
     BestHits<N, Isa>* best_;
     Beam<Isa> beam_;
     int near_side_[3];
     std::int32_t instance_id_;
+    TileUse& use_;  ///< counted for any-hit
     Stats& stats_;
     std::uint32_t looking_ = 0;  ///< packets that may still find something
     M active_[kTilePackets<N>];
+    std::uint32_t stored_ = 0;  ///< packets whose lanes are in lanes_
+    PreparedLanes lanes_[kTilePackets<N>][N / kSingleLanes];
     int size_ = 0;
     TileEntry stack_[kMaxDepth * (kWideSize - 1) + kWideSize];
 };

@@ -4,7 +4,6 @@
 
 #include "core/aligned_vector.h"
 
-#include <packet/bounds.h>
 #include <packet/ray.h>
 
 #include <cstdint>
@@ -18,16 +17,14 @@ namespace packet {
 /// Sorts rays. Keeps its memory for the next time: new memory would cost as much as the sorting.
 class StreamOrder {
 public:
-    static constexpr std::size_t kMostRays = 65536;
+    static constexpr std::size_t kMostRays = 32768;
 
-    /// The indices of `rays`, kMostRays at most, in that order, until the next call. `world` is the
-    /// scene's box, not empty. O(n) time, 9 bytes a ray.
-    [[nodiscard]] std::span<const std::uint32_t> sort(std::span<const Ray> rays,
-                                                      const Bounds3f& world);
+    /// The indices of `rays`, kMostRays at most, in that order, until the next call. O(n) time, 8
+    /// bytes a ray.
+    [[nodiscard]] std::span<const std::uint32_t> sort(std::span<const Ray> rays);
 
 private:
     ScratchVector<std::uint32_t> items_, scratch_;
-    ScratchVector<std::uint8_t> classes_;
 };
 
 /// Lends the tasks of a call one each.

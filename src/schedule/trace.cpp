@@ -65,12 +65,13 @@ std::size_t rays_per_stream_task(std::size_t rays, int threads) {
 class Tasks {
 public:
     Tasks(std::span<const Ray> rays, int width) : rays_(rays), image_(rays.size(), width) {}
-    /// For streams: runs that are sorted, within the scene's box `world`.
-    Tasks(std::span<const Ray> rays, const Bounds3f& world, int threads)
-        : rays_(rays),
-          image_(rays.size(), 0),
-          run_length_(rays_per_stream_task(rays.size(), threads)),
-          world_(&world) {}
+    /// Runs that are sorted, as streams need them.
+    static Tasks sorted(std::span<const Ray> rays, int threads) {
+        Tasks out(rays, 0);
+        out.run_length_ = rays_per_stream_task(rays.size(), threads);
+        out.orders_ = std::make_unique<StreamOrders>();
+        return out;
+    }
 
     [[nodiscard]] std::size_t count() const {
         return image_.is_image() ? image_.tile_count()
@@ -86,24 +87,23 @@ public:
             first = image_.first_ray(task);
             batch.count = image_.fill(task, pixels);
             batch.order = pixels.data();
-        } else if (world_ != nullptr) {
-            sorted = orders_.take();
-            batch.order = sorted->sort(rays_.subspan(first, batch.count), *world_).data();
+        } else if (orders_ != nullptr) {
+            sorted = orders_->take();
+            batch.order = sorted->sort(rays_.subspan(first, batch.count)).data();
         }
         batch.rays = rays_.data() + first;
         if (batch.hits != nullptr) batch.hits += first;
         if (batch.occluded != nullptr) batch.occluded += first;
         if (batch.stats != nullptr) batch.stats->rays += batch.count;
         kernel(batch);
-        if (sorted != nullptr) orders_.give_back(std::move(sorted));
+        if (sorted != nullptr) orders_->give_back(std::move(sorted));
     }
 
 private:
     std::span<const Ray> rays_;
     PixelOrder image_;
     std::size_t run_length_ = kRaysPerTask;
-    const Bounds3f* world_ = nullptr;
-    mutable StreamOrders orders_;
+    std::unique_ptr<StreamOrders> orders_;  ///< if runs are sorted
 };
 
 /// Streams walk one tree, in the rays' own space.
@@ -113,15 +113,28 @@ bool has_one_tree(const SceneView& scene) {
 
 enum class Query { kClosest, kAny };
 
-/// What the rays are traced by: as asked for, or as they and the query suggest. Rays that look for
-/// any hit go by streams even if they cohere: docs/benchmarking.md#streams.
-Mode resolve_mode(const SceneAccel& scene, std::span<const Ray> rays, Query query, Mode asked) {
-    if (asked == Mode::kStream && !has_one_tree(scene.view)) return Mode::kSingle;
-    if (asked != Mode::kAuto) return asked;
+/// What the rays are traced by.
+struct Plan {
+    KernelTable::Kernel kernel;
+    bool is_sorted;         ///< whether the rays are sorted first
+    bool is_trial = false;  ///< whether packets are tried, too
+};
+
+Plan plan_as_asked(const SceneView& scene, Mode mode) {
+    if (mode == Mode::kStream && !has_one_tree(scene)) return {KernelTable::kSingle, false};
+    return {kernel_of(mode), mode == Mode::kStream};
+}
+
+/// As the rays and the query suggest: docs/benchmarking.md#beside-embree.
+Plan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Query query) {
     const bool may_stream = rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
-    if (may_stream && query == Query::kAny) return Mode::kStream;
-    const Mode mode = choose_mode(rays, scene.top.bounds);
-    return may_stream && mode == Mode::kSingle ? Mode::kStream : mode;
+    const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
+    if (may_stream && query == Query::kAny) {
+        return {is_coherent ? KernelTable::kSorted : KernelTable::kStream, true};
+    }
+    if (is_coherent) return {KernelTable::kTile, false};
+    if (may_stream) return {KernelTable::kStream, true};
+    return {KernelTable::kSingle, false, true};
 }
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
@@ -134,11 +147,11 @@ public:
         : scene_(scene.accel()),
           options_(options),
           parallel_(options.threads),
-          mode_(resolve_mode(scene_, rays, query, options.mode)),
-          tasks_(mode_ == Mode::kStream ? Tasks(rays, scene_.top.bounds, parallel_.threads())
-                                        : Tasks(rays, options.width)),
-          tries_(options.mode == Mode::kAuto && mode_ == Mode::kSingle &&
-                 tasks_.count() >= kLeastTasksForTrial) {
+          plan_(options.mode == Mode::kAuto ? plan_by_looks(scene_, rays, query)
+                                            : plan_as_asked(scene_.view, options.mode)),
+          tasks_(plan_.is_sorted ? Tasks::sorted(rays, parallel_.threads())
+                                 : Tasks(rays, options.width)),
+          tries_(plan_.is_trial && tasks_.count() >= kLeastTasksForTrial) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
                                                   "; it must be 0 (no image) or more");
@@ -151,7 +164,7 @@ public:
             options_.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
         const auto kernel = [&](KernelTable::Kernel which) { return kernels[which][counting]; };
         parallel_.run([&] {
-            const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : kernel_of(mode_);
+            const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : plan_.kernel;
             parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
                 if (!is_trial(task)) run_task(task, kernel(best), batch);
             });
@@ -204,7 +217,7 @@ private:
     const SceneAccel& scene_;
     const TraceOptions& options_;
     Parallel parallel_;
-    Mode mode_;
+    Plan plan_;
     Tasks tasks_;
     bool tries_;  ///< whether to find the kernel by trying
     mutable std::mutex stats_mutex_;
