@@ -29,12 +29,14 @@ public:
         : threads_(thread_count(requested)),
           progress_(progress.is_wanted() ? &progress : nullptr) {}
     [[nodiscard]] int threads() const noexcept { return threads_; }
+    /// Whether anybody wants to know of progress.
+    [[nodiscard]] bool is_watched() const noexcept { return progress_ != nullptr; }
 
     /// Runs fn() where the other members spread their work over this many threads.
     template <class Fn>
     void run(Fn&& fn) const {
-        if (threads_ == 1) {
-            fn();
+        if (threads_ == 1 || tbb::this_task_arena::max_concurrency() == threads_) {
+            fn();  // also within another run(): a new arena waits for its threads to wake up
         } else {
             tbb::task_arena(threads_).execute(fn);
         }
