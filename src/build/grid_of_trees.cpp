@@ -71,7 +71,7 @@ private:
 
     [[nodiscard]] Tree build(const CellList& in, const Parallel& parallel) const {
         const Bounds3f cell = cells_.space.box_of(cells_.space.cell_of(in.cell));
-        AlignedVector<Reference> references(in.count);
+        ScratchVector<Reference> references(in.count);
         for (std::size_t i = 0; i < in.count; ++i) {
             references[i] = make_reference(mesh_, cells_.ids[in.first + i], cell);
         }
@@ -118,7 +118,7 @@ private:
 
 }  // namespace
 
-Tree build_grid_of_trees(MeshView mesh, const AlignedVector<Reference>& references,
+Tree build_grid_of_trees(MeshView mesh, const ScratchVector<Reference>& references,
                          const BuildOptions& options, const Parallel& parallel) {
     Tree out;
     if (references.empty()) return out;
