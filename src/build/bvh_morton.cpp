@@ -8,6 +8,7 @@
 
 #include "build/radix_hierarchy.h"
 #include "build/split.h"
+#include "core/macros.h"
 #include "core/morton.h"
 #include "schedule/radix_sort.h"
 
@@ -35,8 +36,8 @@ struct Rooted {
 };
 
 /// The inner node or leaf that two subtrees make, whose roots are, or will be, at these places.
-Rooted join(const Rooted& a, const Rooted& b, std::uint32_t place_a, std::uint32_t place_b,
-            const LeafRule& rule) {
+PACKET_INLINE Rooted join(const Rooted& a, const Rooted& b, std::uint32_t place_a,
+                          std::uint32_t place_b, const LeafRule& rule) {
     Rooted out;
     out.root.bounds = a.root.bounds;
     out.root.bounds.extend(b.root.bounds);

@@ -100,11 +100,11 @@ private:
             wide_nodes += tree.wide_nodes.size();
             blocks += tree.blocks.size();
             out.stats.depth = std::max(out.stats.depth, tree.stats.depth);
+            out.stats.node_count += tree.stats.node_count;
             out.stats.leaf_count += tree.stats.leaf_count - 1;  // its cell is none
             out.stats.sah_cost +=
                 tree.stats.sah_cost * static_cast<double>(tree.bounds.half_area()) / box_area;
         }
-        out.stats.node_count += nodes;
         out.nodes.resize(nodes);
         out.wide_nodes.resize(wide_nodes);
         out.blocks.resize(blocks);
