@@ -139,10 +139,11 @@ public:
         }
         Hierarchy out;
         out.nodes.resize(nodes_.size());
-        out.references.resize(count_);
+        ScratchVector<Reference> sorted(count_);
         nodes_.copy_to(out.nodes, stream_.get());
-        sorted_.copy_to(out.references, stream_.get());
+        sorted_.copy_to(sorted, stream_.get());
         stream_.synchronize();
+        out.ids = ids_of(sorted, Parallel(1));
         return out;
     }
 

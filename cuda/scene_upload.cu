@@ -1,5 +1,7 @@
 #include "scene_upload.h"
 
+#include <packet/error.h>
+
 #include "scene/scene_accel.h"
 
 #include <algorithm>
@@ -58,6 +60,10 @@ UploadedScene::UploadedScene(const SceneAccel& accel) : view_(accel.view) {
 }
 
 DeviceTree UploadedScene::upload(const TreeView& tree, std::size_t block_count) {
+    if (tree.nodes == nullptr && tree.node_count != 0) {
+        throw Error(ErrorCode::kUnsupported,
+                    "devices walk binary nodes: build with BuildOptions::keep_binary_nodes");
+    }
     const std::vector<DeviceTriangle> triangles = unpack({tree.blocks, block_count});
     arrays_.push_back({DeviceArray<Node>(std::span<const Node>(tree.nodes, tree.node_count)),
                        DeviceArray<DeviceTriangle>(std::span<const DeviceTriangle>(triangles))});

@@ -29,7 +29,7 @@ void check_sides(const glm::vec3& extent, double cells, const glm::ivec3& want) 
     CHECK(glm::ivec3(space.side(0), space.side(1), space.side(2)) == want);
 }
 
-AlignedVector<Reference> references_of(const TriangleMesh& mesh) {
+ScratchVector<Reference> references_of(const TriangleMesh& mesh) {
     return collect_references(mesh.view(), Parallel(1)).items;
 }
 

@@ -209,7 +209,7 @@ TEST_CASE("bits that are dropped keep any tree within the depth that is walked")
 
 TEST_CASE("a builder whose codes would lead too deep stays within kMaxDepth") {
     // Points whose codes are powers of 2, and thousands more at the origin.
-    AlignedVector<Reference> references;
+    ScratchVector<Reference> references;
     for (int i = 0; i < 3000; ++i) references.push_back(point_reference({0, 0, 0}, 0));
     for (int bit = 0; bit < 21; ++bit) {
         for (int axis = 0; axis < 3; ++axis) {

@@ -72,6 +72,18 @@ TEST_CASE("progress goes from 0 to 1, never back, and is told by one thread at a
     });
 }
 
+TEST_CASE("a grid of trees tells of its cells' trees, which are most of the work") {
+    Scene scene = make_scene(tools::make_soup(8000, 2));
+    BuildOptions options;
+    options.accel = AccelKind::kGridOfTrees;
+    options.grid_density = 1.0f;  // 64 cells; laying out their lists is told of a dozen times
+    options.threads = 1;
+    int reports = 0;
+    options.progress = [&](float) { return ++reports > 0; };
+    scene.commit(options);
+    CHECK(reports > 40);
+}
+
 TEST_CASE("a build is cancelled at any report, and leaves the scene as it was") {
     Scene scene = make_test_scene();
     scene.commit();

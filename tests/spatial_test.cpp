@@ -55,7 +55,7 @@ bool are_same(const Tree& a, const Tree& b) {
     return same(a.nodes, b.nodes) && same(a.wide_nodes, b.wide_nodes) && same(a.blocks, b.blocks);
 }
 
-NodeRange whole_node(AlignedVector<Reference>& references, std::size_t room,
+NodeRange whole_node(ScratchVector<Reference>& references, std::size_t room,
                      const Parallel& parallel) {
     NodeRange node;
     const std::size_t count = references.size();
@@ -126,7 +126,7 @@ TEST_CASE("where the budget runs out does not depend on threads") {
 TEST_CASE("a plane that costs least parts the references as it was said to") {
     const Parallel parallel(1);
     const TriangleMesh mesh = make_diagonals(500, 5);
-    AlignedVector<Reference> references = collect_references(mesh.view(), parallel).items;
+    ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     const NodeRange node = whole_node(references, 700, parallel);
     const SpatialSplit split = find_spatial_split(mesh.view(), node, parallel);
     REQUIRE(split.axis >= 0);
@@ -155,7 +155,7 @@ TEST_CASE("a plane that costs least parts the references as it was said to") {
 TEST_CASE("with less room than a plane cuts triangles, as many are cut as there is room") {
     const Parallel parallel(1);
     const TriangleMesh mesh = make_diagonals(500, 6);
-    AlignedVector<Reference> references = collect_references(mesh.view(), parallel).items;
+    ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     NodeRange node = whole_node(references, 1000, parallel);
     const SpatialSplit split = find_spatial_split(mesh.view(), node, parallel);
     node.room = 3;
@@ -168,7 +168,7 @@ TEST_CASE("with less room than a plane cuts triangles, as many are cut as there 
 TEST_CASE("a plane is none where the halves might not fit the depth") {
     const Parallel parallel(1);
     const TriangleMesh mesh = make_diagonals(500, 7);
-    AlignedVector<Reference> references = collect_references(mesh.view(), parallel).items;
+    ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     const NodeRange node = whole_node(references, 500, parallel);
     const SpatialSplit split = find_spatial_split(mesh.view(), node, parallel);
     CHECK(!split_space(mesh.view(), node, split, kMaxDepth - 5, parallel).has_value());

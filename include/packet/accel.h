@@ -72,6 +72,8 @@ struct BuildOptions {
     /// Bits of Morton codes, for `kBvhMorton`: 30, 63, or 0 to choose by the number of triangles.
     /// 30 sort faster, 63 tell apart what is 2^-21 of the scene's extent from each other.
     int morton_bits = 0;
+    /// Keep trees in their binary form, too, as CUDA devices walk them. 32 bytes a node.
+    bool keep_binary_nodes = true;
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
     /// the same for any number.
     int threads = 0;

@@ -89,7 +89,7 @@ KdBuild parse_kd_build(std::string_view name) {
 
 /// `tree(hierarchy)` makes a tree of what most builders hand on.
 template <class MakeTree>
-static Tree build(AccelKind kind, MeshView mesh, AlignedVector<Reference> references,
+static Tree build(AccelKind kind, MeshView mesh, ScratchVector<Reference> references,
                   const BuildOptions& options, const Parallel& parallel, const MakeTree& tree) {
     const auto kd_tree = [&](KdRule rule) {
         return tree(build_kd_tree(rule, mesh, std::move(references), options, parallel));

@@ -61,7 +61,7 @@ public:
             return centroid2(r)[axis] < middle[axis];
         });
         auto first = static_cast<std::size_t>(second - refs.begin());
-        if (!is_allowed(first, refs.size(), depth)) first = halve(refs, node.bounds.centroids);
+        if (!is_allowed(first, refs.size(), depth)) first = halve(node);
         return divide(node, first, parallel_);
     }
 
@@ -72,7 +72,7 @@ private:
 
 }  // namespace
 
-Hierarchy build_bvh_midpoint(AlignedVector<Reference> references, const BuildOptions& options,
+Hierarchy build_bvh_midpoint(ScratchVector<Reference> references, const BuildOptions& options,
                              const Parallel& parallel) {
     return TopDownBuilder(std::move(references), 0, parallel, MidpointSplit(options, parallel))
         .build();

@@ -12,7 +12,7 @@ namespace packet {
 /// that separates nothing, or would lead deeper than kMaxDepth, it is halved. The costs in
 /// `options` play no part. O(n log n) time for evenly spread references, O(n kMaxDepth) at worst,
 /// 72 bytes of nodes a reference, parallel; the result does not depend on the number of threads.
-[[nodiscard]] Hierarchy build_bvh_midpoint(AlignedVector<Reference> references,
+[[nodiscard]] Hierarchy build_bvh_midpoint(ScratchVector<Reference> references,
                                            const BuildOptions& options, const Parallel& parallel);
 
 }  // namespace packet

@@ -1,6 +1,6 @@
-// Sorts references by the Morton codes of their centroids, builds the radix tree over the codes,
-// all nodes at once, and its boxes from the leaves up: of the two children of a node, the one that
-// is done last goes on with the node.
+// Sorts references by the Morton codes of their centroids and builds the radix tree over the codes,
+// with its boxes, from the leaves up: large ranges are parted where their tree parts them, and
+// each part that is small enough is built by one task from right to left.
 //
 // Lauterbach et al. Fast BVH construction on GPUs. Eurographics 2009.
 // Karras. Maximizing parallelism in the construction of BVHs, octrees, and k-d trees. HPG 2012.
@@ -8,6 +8,7 @@
 
 #include "build/radix_hierarchy.h"
 #include "build/split.h"
+#include "core/macros.h"
 #include "core/morton.h"
 #include "schedule/radix_sort.h"
 
@@ -20,125 +21,218 @@ namespace {
 
 // Pieces of loops whose work is a few dozen nanoseconds an item.
 constexpr std::size_t kGrain = 8192;
+// References of a subtree that one task builds: its nodes stay in the second level's cache.
+constexpr std::uint32_t kTaskSize = 1024;
+// References whose boxes are fetched ahead: they lie anywhere.
+constexpr std::uint32_t kAhead = 8;
 
-// Of a build's time; the two loops over nodes take about as long as each other.
-constexpr double kShareOfSort = 0.5, kShareOfLoop = 0.25;
+// Of a build's time.
+constexpr double kShareOfSort = 0.5;
+
+/// A subtree whose root has no place yet.
+struct Rooted {
+    BuildNode root;
+    RadixSubtree subtree;
+};
+
+/// The inner node or leaf that two subtrees make, whose roots are, or will be, at these places.
+PACKET_INLINE Rooted join(const Rooted& a, const Rooted& b, std::uint32_t place_a,
+                          std::uint32_t place_b, const LeafRule& rule) {
+    Rooted out;
+    out.root.bounds = a.root.bounds;
+    out.root.bounds.extend(b.root.bounds);
+    out.subtree = rule.join(a.subtree, b.subtree, out.root.bounds.half_area());
+    if (out.subtree.height == 0) {
+        out.root.first = out.subtree.first;
+        out.root.count = out.subtree.count;
+    } else {
+        out.root.first = place_a;
+        out.root.second = place_b;
+    }
+    return out;
+}
+
+/// Builds the subtree over a range of sorted items from right to left. Of neighbours, those whose
+/// codes have most bits in common are joined first, so a stack of subtrees that still lack their
+/// left neighbour is all that is needed, and no search. Nodes come about in the reverse of
+/// depth-first order, in which they are read later on.
+///
+/// Apetrei. Fast and simple agglomerative LBVH construction. CGVC 2014.
+template <class Code>
+class RangeBuilder {
+public:
+    RangeBuilder(std::span<const MortonItem<Code>> items, std::span<const Reference> references,
+                 const RadixKeys<Code>& keys, const LeafRule& rule)
+        : items_(items), references_(references), keys_(keys), rule_(rule) {}
+
+    /// Over items `first` to `last`. Children are in nodes(), and referred to by their place there.
+    Rooted build(std::uint32_t first, std::uint32_t last) {
+        nodes_.clear();
+        nodes_.reserve(2 * std::size_t{last - first + 1});
+        int depth = 0;
+        for (std::uint32_t i = last + 1; i-- > first;) {
+            const int bits = i == first ? -1 : keys_.common_bits(i - 1, i);
+            stack_[depth++] = {make_leaf(i), static_cast<std::uint32_t>(nodes_.size()), bits};
+            for (; depth > 1 && stack_[depth - 2].bits > bits; --depth) {
+                join_top(stack_[depth - 1], stack_[depth - 2]);
+            }
+        }
+        return stack_[0].rooted;
+    }
+    /// Pairs of children, the second before the first.
+    [[nodiscard]] const std::vector<BuildNode>& nodes() const { return nodes_; }
+
+private:
+    struct Entry {
+        Rooted rooted;
+        std::uint32_t begin;  ///< of its nodes, which are the last ones but for those above
+        int bits;             ///< in common with its left neighbour
+    };
+
+    Rooted make_leaf(std::uint32_t item) const {
+        if (item >= kAhead) __builtin_prefetch(&references_[items_[item - kAhead].index]);
+        const Bounds3f bounds = references_[items_[item].index].bounds();
+        return {{bounds, item, 0, 1}, rule_.leaf(item, bounds.half_area())};
+    }
+    /// The last one, on the left, with the one before it, which it replaces.
+    void join_top(const Entry& left, Entry& right) {
+        const auto place = static_cast<std::uint32_t>(nodes_.size());
+        const Rooted joined = join(left.rooted, right.rooted, place + 1, place, rule_);
+        if (joined.subtree.height == 0) {
+            nodes_.resize(right.begin);
+        } else {
+            nodes_.push_back(right.rooted.root);
+            nodes_.push_back(left.rooted.root);
+        }
+        right.rooted = joined;
+        right.bits = left.bits;
+    }
+
+    std::span<const MortonItem<Code>> items_;
+    std::span<const Reference> references_;
+    const RadixKeys<Code>& keys_;
+    const LeafRule& rule_;
+    std::vector<BuildNode> nodes_;
+    Entry stack_[kMortonBits<Code> + 33];  ///< each lacks a bit of the key that the last one has
+};
 
 template <class Code>
 class Builder {
     using Item = MortonItem<Code>;
 
 public:
-    Builder(AlignedVector<Reference> references, const BuildOptions& options,
+    Builder(ScratchVector<Reference> references, const BuildOptions& options,
             const Parallel& parallel)
         : rule_(options),
           parallel_(parallel),
           count_(references.size()),
-          unsorted_(std::move(references)) {}
+          references_(std::move(references)) {}
 
     /// For at least two references.
     Hierarchy build() {
         sort();
         parallel_.advance(kShareOfSort);
+        Hierarchy out;
         nodes_.resize(2 * count_ - 1);
-        parents_.resize(2 * count_ - 1);
-        subtrees_.resize(count_ - 1);
-        build_nodes(0);
         // Only where codes that differ in nearly every bit meet many that are equal.
-        if (subtrees_[0].height > kMaxDepth) {
+        if (build_nodes(0) > kMaxDepth) {
             build_nodes(dropped_bits_for_depth(kMortonBits<Code>, count_));
         }
-        return {std::move(nodes_), std::move(references_)};
+        nodes_.resize(used_);
+        out.nodes = std::move(nodes_);
+        out.ids.resize(count_);
+        parallel_.for_pieces(count_, kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) out.ids[i] = references_[items_[i].index].id;
+        });
+        return out;
     }
 
 private:
-    /// Fills items_, sorted, and references_ in their order.
+    /// Fills items_, sorted.
     void sort() {
-        const MortonGrid<Code> grid(measure(unsorted_, parallel_).centroids);
+        const MortonGrid<Code> grid(measure(references_, parallel_).centroids);
         ScratchVector<Item> items(count_), scratch(count_);
         parallel_.for_pieces(count_, kGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
-                items[i] = {grid.code(centroid2(unsorted_[i])), static_cast<std::uint32_t>(i)};
+                items[i] = {grid.code(centroid2(references_[i])), static_cast<std::uint32_t>(i)};
             }
         });
         const std::span<Item> sorted =
             radix_sort<Item>(items, scratch, kMortonBits<Code>, parallel_,
                              [](const Item& item) { return item.code; });
         items_ = std::move(sorted.data() == items.data() ? items : scratch);
-        references_.resize(count_);
-        parallel_.for_pieces(count_, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) references_[i] = unsorted_[items_[i].index];
-        });
-        unsorted_ = {};
     }
 
-    void build_nodes(int dropped_bits) {
+    /// Returns the height of the tree.
+    int build_nodes(int dropped_bits) {
+        used_ = 1;
         const RadixKeys<Code> keys(items_, dropped_bits);
-        const RadixHierarchy tree{nodes_.data(), parents_.data(), subtrees_.data(),
-                                  static_cast<std::uint32_t>(count_)};
-        parallel_.for_pieces(count_ - 1, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                const auto slot = static_cast<std::uint32_t>(i);
-                tree.link(slot, radix_node(keys, slot));
-            }
-            advance(end - begin);
-        });
-        std::vector<std::atomic<std::uint8_t>> is_one_child_done(count_ - 1);
-        parallel_.for_pieces(count_, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                climb(tree, static_cast<std::uint32_t>(i), is_one_child_done);
-            }
-            advance(end - begin);
-        });
+        const Rooted all = build_range(keys, 0, static_cast<std::uint32_t>(count_ - 1));
+        nodes_[0] = all.root;
+        return all.subtree.height;
     }
 
-    void advance(std::size_t items) const {
-        parallel_.advance(kShareOfLoop * static_cast<double>(items) / static_cast<double>(count_));
+    /// Large subtrees' parts are built by tasks of their own.
+    Rooted build_range(const RadixKeys<Code>& keys, std::uint32_t first, std::uint32_t last) {
+        if (last - first < kTaskSize) return build_task(keys, first, last);
+        const std::uint32_t split = keys.split(first, last);
+        Rooted a, b;
+        parallel_.both([&] { a = build_range(keys, first, split); },
+                       [&] { b = build_range(keys, split + 1, last); });
+        const std::uint32_t pair = used_.fetch_add(2, std::memory_order_relaxed);
+        nodes_[pair] = a.root;
+        nodes_[pair + 1] = b.root;
+        return join(a, b, pair, pair + 1, rule_);
     }
 
-    /// Finishes a leaf, and those ancestors whose other descendants are finished.
-    void climb(const RadixHierarchy& tree, std::uint32_t item,
-               std::span<std::atomic<std::uint8_t>> is_one_child_done) {
-        tree.make_leaf(item, references_[item]);
-        std::uint32_t slot = tree.first_leaf() + item;
-        while (slot != 0) {
-            slot = tree.parents[slot];
-            // Releases this child to the thread that comes second, or acquires the other child.
-            if (is_one_child_done[slot].exchange(1, std::memory_order_acq_rel) == 0) return;
-            tree.finish(slot, rule_);
-        }
+    Rooted build_task(const RadixKeys<Code>& keys, std::uint32_t first, std::uint32_t last) {
+        RangeBuilder<Code> builder(items_, references_, keys, rule_);
+        Rooted out = builder.build(first, last);
+        const auto count = static_cast<std::uint32_t>(builder.nodes().size());
+        const std::uint32_t last_place =
+            used_.fetch_add(count, std::memory_order_relaxed) + count - 1;
+        const auto move = [last_place](BuildNode node) {
+            if (node.is_leaf()) return node;
+            node.first = last_place - node.first;
+            node.second = last_place - node.second;
+            return node;
+        };
+        for (std::uint32_t i = 0; i < count; ++i) nodes_[last_place - i] = move(builder.nodes()[i]);
+        out.root = move(out.root);
+        parallel_.advance((1.0 - kShareOfSort) * static_cast<double>(last - first + 1) /
+                          static_cast<double>(count_));
+        return out;
     }
 
     LeafRule rule_;
     const Parallel& parallel_;
     std::size_t count_;
-    AlignedVector<Reference> unsorted_, references_;
+    ScratchVector<Reference> references_;
     ScratchVector<Item> items_;
     ScratchVector<BuildNode> nodes_;
-    ScratchVector<std::uint32_t> parents_;
-    ScratchVector<RadixSubtree> subtrees_;
+    std::atomic<std::uint32_t> used_ = 1;  ///< nodes; the root has the first
 };
 
 /// The tree over one reference, or none.
-Hierarchy build_trivial(AlignedVector<Reference> references) {
+Hierarchy build_trivial(ScratchVector<Reference> references) {
     Hierarchy out;
     for (const Reference& r : references) out.nodes.push_back({r.bounds(), 0, 0, 1});
-    out.references = std::move(references);
+    for (const Reference& r : references) out.ids.push_back(r.id);
     return out;
 }
 
 }  // namespace
 
 int chosen_morton_bits(std::size_t references, const BuildOptions& options) {
-    // Up to this, 30 bits do as well as 63 for evenly spread triangles (SAH cost within 0.1%, in
-    // terrain and city) and sort in half the passes. Kept well below where they differ, for uneven
-    // scenes.
-    constexpr std::size_t kMostFor30Bits = 100000;
+    // Up to this, 30 bits do as well as 63 (a million triangles of terrain, city, hairball, soup:
+    // SAH cost within 0.1%; uneven scenes of 1 to 2 million, a kitchen, a dragon, a stadium: within
+    // 0.5%) and sort in half the passes over half the memory.
+    constexpr std::size_t kMostFor30Bits = 4000000;
     if (options.morton_bits != 0) return options.morton_bits;
     return references <= kMostFor30Bits ? 30 : 63;
 }
 
-Hierarchy build_bvh_morton(AlignedVector<Reference> references, const BuildOptions& options,
+Hierarchy build_bvh_morton(ScratchVector<Reference> references, const BuildOptions& options,
                            const Parallel& parallel) {
     if (references.size() < 2) return build_trivial(std::move(references));
     const int bits = chosen_morton_bits(references.size(), options);

@@ -13,7 +13,7 @@ namespace packet {
 /// these are cheaper. No leaf is deeper than kMaxDepth. O(n) time but for the searches of a node's
 /// range, which are O(log n) and mostly short; 120 bytes of nodes and scratch a reference beside
 /// the references; parallel throughout, and the result does not depend on the number of threads.
-[[nodiscard]] Hierarchy build_bvh_morton(AlignedVector<Reference> references,
+[[nodiscard]] Hierarchy build_bvh_morton(ScratchVector<Reference> references,
                                          const BuildOptions& options, const Parallel& parallel);
 
 /// How many bits the codes of so many references have: 30 or 63.

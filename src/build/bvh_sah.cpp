@@ -15,20 +15,29 @@ public:
         : options_(options), parallel_(parallel) {}
 
     std::optional<Halves> operator()(const NodeRange& node, int depth) const {
-        const Binning binning(node.bounds.centroids);
-        const ObjectSplit split = find_object_split(node.refs, binning, parallel_);
+        if (is_surely_leaf(node)) return {};
+        const ObjectSplit split = find_object_split(node, parallel_);
         if (is_leaf(node, split.cost, options_)) return {};
-        return split_objects(node, binning, split, depth, parallel_);
+        return split_objects(node, split, depth, parallel_);
     }
 
 private:
+    /// Whether even children that each fit one reference would not pay: half of all leaves are
+    /// found so, without a look for a split.
+    [[nodiscard]] bool is_surely_leaf(const NodeRange& node) const {
+        if (node.refs.size() > kFewReferences) return false;
+        float least_cost = 0.0f;
+        for (const Reference& r : node.refs) least_cost += r.bounds().half_area();
+        return is_leaf(node, least_cost, options_);
+    }
+
     const BuildOptions& options_;
     const Parallel& parallel_;
 };
 
 }  // namespace
 
-Hierarchy build_bvh_sah(AlignedVector<Reference> references, const BuildOptions& options,
+Hierarchy build_bvh_sah(ScratchVector<Reference> references, const BuildOptions& options,
                         const Parallel& parallel) {
     return TopDownBuilder(std::move(references), 0, parallel, SahSplit(options, parallel)).build();
 }

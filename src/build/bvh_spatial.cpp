@@ -38,15 +38,14 @@ public:
           parallel_(parallel) {}
 
     std::optional<Halves> operator()(const NodeRange& node, int depth) const {
-        const Binning binning(node.bounds.centroids);
-        const ObjectSplit objects = find_object_split(node.refs, binning, parallel_);
+        const ObjectSplit objects = find_object_split(node, parallel_);
         SpatialSplit space;
         if (is_worth_cutting(node, objects)) space = find_spatial_split(mesh_, node, parallel_);
         if (is_leaf(node, std::min(objects.cost, space.cost), options_)) return {};
         if (space.cost < objects.cost) {
             if (auto halves = split_space(mesh_, node, space, depth, parallel_)) return halves;
         }
-        return split_objects(node, binning, objects, depth, parallel_);
+        return split_objects(node, objects, depth, parallel_);
     }
 
 private:
@@ -73,7 +72,7 @@ std::size_t room(std::size_t count, const BuildOptions& options) {
 
 }  // namespace
 
-Hierarchy build_bvh_spatial(MeshView mesh, AlignedVector<Reference> references,
+Hierarchy build_bvh_spatial(MeshView mesh, ScratchVector<Reference> references,
                             const BuildOptions& options, const Parallel& parallel) {
     NodeBounds root;
     parallel.run([&] { root = measure(references, parallel); });

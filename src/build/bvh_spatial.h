@@ -11,7 +11,7 @@ namespace packet {
 /// point of it is in one of these boxes. There are at most 1 + options.spatial_budget references a
 /// triangle. Every leaf holds at most `options.max_leaf_size`; no leaf is deeper than kMaxDepth.
 /// O(n log n) time, parallel; the result does not depend on the number of threads.
-[[nodiscard]] Hierarchy build_bvh_spatial(MeshView mesh, AlignedVector<Reference> references,
+[[nodiscard]] Hierarchy build_bvh_spatial(MeshView mesh, ScratchVector<Reference> references,
                                           const BuildOptions& options, const Parallel& parallel);
 
 }  // namespace packet

@@ -17,7 +17,7 @@ namespace packet {
 inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 31) - 2;
 
 struct Cell {
-    AlignedVector<Reference> references;  ///< boxes of the parts of triangles in this cell
+    ScratchVector<Reference> references;  ///< boxes of the parts of triangles in this cell
     Bounds3f bounds;                      ///< theirs: cells end where their contents do
     std::size_t spare = 0;                ///< how many references cuts in here may add
     double work = 1.0;                    ///< how much of the build it is
@@ -36,7 +36,7 @@ struct Cell {
 
 /// Fills in a cell that holds everything: cuts may make its references
 /// options.max_reference_factor times as many, up to `most`.
-inline void fill_root(Cell& root, AlignedVector<Reference> references, const BuildOptions& options,
+inline void fill_root(Cell& root, ScratchVector<Reference> references, const BuildOptions& options,
                       std::size_t most) {
     const double allowed = std::min(
         static_cast<double>(references.size()) * static_cast<double>(options.max_reference_factor),

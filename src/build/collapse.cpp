@@ -1,254 +1,249 @@
-// A wide node's children are a cut through the binary tree below it. Some builders know their cuts.
-// For the others dynamic programming finds the best: the cost of showing a subtree as a forest of
-// at most k trees follows from those of its two children with fewer.
-//
-// Ylitie, Karras, Laine. Efficient incoherent ray traversal on GPUs through compressed wide BVHs.
-// High-Performance Graphics 2017.
 #include "build/collapse.h"
 
-#include "core/macros.h"
+#include "build/triangle_block.h"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <limits>
-#include <utility>
-#include <vector>
 
 namespace packet {
 
 namespace {
 
-// Expected cost of a wide node, and of a block of triangles. Instructions would say 1 to 4, but
-// half of the blocks are met for nothing and left early; from 2 to 3 speeds do not differ.
-constexpr float kNodeCost = 1.0f;
-constexpr float kBlockCost = 2.0f;
-// Nodes: some hundred microseconds of work.
-constexpr std::size_t kCheckInterval = 4096;
+// Subtrees of more items than this are parted further: some 300 us of work.
+constexpr std::uint32_t kTaskItems = 8192;
+// Of an item that only fills a block up.
+constexpr std::uint32_t kNoId = 0xFFFFFFFF;
 
-/// The children of a wide node, in order.
-struct Children {
-    std::uint32_t id[kWideSize];
-    int count = 0;
-};
-
-/// The cuts of least cost.
-class BestCuts {
+/// Finds places for leaves in blocks: for each the one that it fills up best, of a few that are not
+/// full, or a new one.
+class BlockPacker {
 public:
-    BestCuts(std::span<const Node> nodes, std::uint32_t block_size, const Parallel& parallel)
-        : nodes_(nodes), block_size_(block_size), costs_(nodes.size()) {
-        // Children come after their parent in depth-first order: backwards is bottom-up.
-        for (std::size_t i = nodes.size(); i-- > 0;) {
-            if (i % kCheckInterval == 0) parallel.check();
-            weigh(static_cast<std::uint32_t>(i));
+    /// The first item of a leaf of `count`.
+    std::uint32_t place(std::uint32_t count) {
+        Open* best = nullptr;
+        for (Open& open : std::span(open_, static_cast<std::size_t>(open_count_))) {
+            if (open.room >= count && (best == nullptr || open.room < best->room)) best = &open;
         }
+        if (best == nullptr) return place_in_new(count);
+        const std::uint32_t first = best->end - best->room;
+        best->room -= count;
+        if (best->room == 0) *best = open_[--open_count_];
+        return first;
     }
-
-    /// A subtree that becomes one child: a leaf if it has no children, or is cheaper so.
-    [[nodiscard]] bool is_leaf(std::uint32_t id) const {
-        return nodes_[id].is_leaf() || costs_[id].forest[0] == costs_[id].leaf;
-    }
-    [[nodiscard]] std::uint32_t item_count(std::uint32_t id) const { return costs_[id].items; }
-    [[nodiscard]] Children children(std::uint32_t id) const {
-        Children out;
-        gather_both(id, kWideSize, out);
-        return out;
-    }
+    [[nodiscard]] std::uint32_t item_count() const { return end_; }
 
 private:
-    /// What a subtree costs as a forest of at most 1 to kMostRoots trees, and its items.
-    struct Cost {
-        static constexpr int kMostRoots = kWideSize - 1;  // one at least is on the other side
-        float forest[kMostRoots];
-        float split_in_8;  ///< the best cut of an inner node into 8 children
-        float leaf;        ///< as one leaf, +inf if that is too large
-        std::uint32_t items;
+    struct Open {
+        std::uint32_t end, room;
     };
+    // Blocks that are shared should be near each other. Twice as many fill 1% more.
+    static constexpr int kMostOpen = 8;
 
-    [[nodiscard]] std::uint32_t second(std::uint32_t node) const { return nodes_[node].link; }
-
-    [[nodiscard]] static float half_area(const Node& node) {
-        const float x = node.plane[1][0] - node.plane[0][0];
-        const float y = node.plane[1][1] - node.plane[0][1];
-        const float z = node.plane[1][2] - node.plane[0][2];
-        return x * y + y * z + z * x;
-    }
-
-    /// Cheapest way to show an inner node's children as `roots` trees, and how many go to the
-    /// first.
-    struct Cut {
-        float cost = std::numeric_limits<float>::infinity();
-        int first = 1;
-    };
-    [[nodiscard]] Cut best_cut(std::uint32_t node, int roots) const {
-        const Cost &a = costs_[node + 1], &b = costs_[second(node)];
-        Cut best;
-        for (int k = 1; k < roots; ++k) {
-            const float cost = a.forest[k - 1] + b.forest[roots - k - 1];
-            if (cost < best.cost) best = {cost, k};
+    std::uint32_t place_in_new(std::uint32_t count) {
+        const std::uint32_t first = end_;
+        end_ += (count + kBlockSize - 1) / kBlockSize * kBlockSize;
+        const std::uint32_t room = end_ - first - count;
+        if (room == 0) return first;
+        if (open_count_ == kMostOpen) {
+            Open* const fullest = std::min_element(
+                open_, open_ + kMostOpen, [](auto& a, auto& b) { return a.room < b.room; });
+            if (fullest->room >= room) return first;
+            *fullest = open_[--open_count_];
         }
-        return best;
+        open_[open_count_++] = {end_, room};
+        return first;
     }
 
-    void weigh(std::uint32_t id) {
-        const Node& node = nodes_[id];
-        Cost& cost = costs_[id];
-        const float area = half_area(node);
-        if (node.is_leaf()) {
-            cost.items = node.count;
-            const std::uint32_t blocks = (node.count + block_size_ - 1) / block_size_;
-            cost.leaf = area * kBlockCost * static_cast<float>(blocks);
-            std::fill_n(cost.forest, Cost::kMostRoots, cost.leaf);
-            return;
-        }
-        cost.items = costs_[id + 1].items + costs_[second(id)].items;
-        cost.leaf =
-            cost.items <= block_size_ ? area * kBlockCost : std::numeric_limits<float>::infinity();
-        cost.split_in_8 = best_cut(id, kWideSize).cost;
-        cost.forest[0] = std::min(cost.leaf, area * kNodeCost + cost.split_in_8);
-        for (int roots = 2; roots <= Cost::kMostRoots; ++roots) {
-            cost.forest[roots - 1] = std::min(cost.forest[roots - 2], best_cut(id, roots).cost);
-        }
-    }
-
-    /// Shows the subtree as at most `roots` trees, in order.
-    void gather(std::uint32_t id, int roots, Children& out) const {
-        const Cost& cost = costs_[id];
-        while (roots > 1 && cost.forest[roots - 1] == cost.forest[roots - 2]) --roots;
-        if (roots == 1 || nodes_[id].is_leaf()) {
-            out.id[out.count++] = id;
-            return;
-        }
-        gather_both(id, roots, out);
-    }
-    void gather_both(std::uint32_t id, int roots, Children& out) const {
-        const int first = best_cut(id, roots).first;
-        gather(id + 1, first, out);
-        gather(second(id), roots - first, out);
-    }
-
-    std::span<const Node> nodes_;
-    std::uint32_t block_size_;
-    ScratchVector<Cost> costs_;
+    Open open_[kMostOpen];
+    int open_count_ = 0;
+    std::uint32_t end_ = 0;
 };
 
-/// The cuts that a builder made.
-class GivenCuts {
-public:
-    GivenCuts(std::span<const Node> nodes, const std::vector<bool>& is_wide_child)
-        : nodes_(nodes), is_wide_child_(is_wide_child) {}
-
-    [[nodiscard]] bool is_leaf(std::uint32_t id) const { return nodes_[id].is_leaf(); }
-    [[nodiscard]] std::uint32_t item_count(std::uint32_t id) const { return nodes_[id].count; }
-    [[nodiscard]] Children children(std::uint32_t id) const {
-        Children out;
-        gather(id + 1, out);
-        gather(nodes_[id].link, out);
-        return out;
-    }
-
-private:
-    void gather(std::uint32_t id, Children& out) const {
-        if (is_wide_child_[id]) {
-            PACKET_ASSERT(out.count < kWideSize);
-            out.id[out.count++] = id;
-            return;
-        }
-        gather(id + 1, out);
-        gather(nodes_[id].link, out);
-    }
-
-    std::span<const Node> nodes_;
-    const std::vector<bool>& is_wide_child_;
+/// Wide nodes before they are written: what their children are, and where.
+struct PlannedNode {
+    WideChildren children;
+    std::uint32_t link[kWideSize];  ///< a leaf's first item, or the node, in the same plan
 };
 
-/// Writes wide nodes, and places the items of their leaves.
-template <class Cuts>
-class Writer {
-public:
-    Writer(std::span<Node> nodes, std::uint32_t block_size, Cuts cuts, const Parallel& parallel)
-        : nodes_(nodes), block_size_(block_size), cuts_(std::move(cuts)), parallel_(parallel) {}
+/// A subtree of another plan's, whose parent is there.
+struct Hanging {
+    std::uint32_t parent, root;
+    int child;
+};
 
-    Collapsed write() {
-        if (!nodes_.empty()) emit(0);
+struct Plan {
+    std::vector<PlannedNode> nodes;
+    std::vector<std::uint32_t> id_of_item;
+    std::size_t first_node = 0, first_block = 0;
+
+    [[nodiscard]] std::size_t block_count() const { return id_of_item.size() / kBlockSize; }
+};
+
+class Planner {
+public:
+    Planner(const Hierarchy& hierarchy, const WideCuts& cuts, Items items)
+        : nodes_(hierarchy.nodes.data()), ids_(hierarchy.ids.data()), cuts_(cuts), items_(items) {}
+
+    /// Subtrees of at most `hang_at` items are left to others.
+    Plan plan(std::uint32_t root, std::uint32_t hang_at, std::vector<Hanging>& hanging) {
+        hang_at_ = hang_at;
+        hanging_ = &hanging;
+        if (hang_at == 0) out_.id_of_item.reserve(2 * cuts_.item_count(root));
+        emit(root);
         return std::move(out_);
     }
 
 private:
-    /// Appends the wide node of a subtree, and those below it, and returns its index.
     std::uint32_t emit(std::uint32_t id) {
-        Children children;
-        if (cuts_.is_leaf(id)) {
-            children.id[children.count++] = id;  // only the root: it is a node with one child
-        } else {
-            children = cuts_.children(id);
-        }
         const auto index = static_cast<std::uint32_t>(out_.nodes.size());
-        if (index % kCheckInterval == 0) parallel_.check();
-        out_.nodes.push_back(empty_node());
-        for (int i = 0; i < children.count; ++i) {
-            const std::uint32_t child = children.id[i];
-            const bool leaf = cuts_.is_leaf(child);
-            const std::uint32_t link = leaf ? place_items(child) : emit(child);
-            WideNode& node = out_.nodes[index];
-            for (int a = 0; a < 3; ++a) {
-                node.plane[0][a][i] = nodes_[child].plane[0][a];
-                node.plane[1][a][i] = nodes_[child].plane[1][a];
+        PlannedNode node;
+        if (cuts_.is_leaf(id)) {
+            node.children.id[node.children.count++] = id;  // the root: a node with one child
+        } else {
+            node.children = cuts_.children(id);
+        }
+        out_.nodes.push_back(node);
+        for (int i = 0; i < node.children.count; ++i) {
+            const std::uint32_t child = node.children.id[i];
+            if (cuts_.is_leaf(child)) {
+                out_.nodes[index].link[i] = place(child);
+            } else if (cuts_.item_count(child) <= hang_at_) {
+                hanging_->push_back({index, child, i});
+            } else {
+                out_.nodes[index].link[i] = emit(child);
             }
-            node.child[i] = {link, leaf ? cuts_.item_count(child) : 0};
         }
         return index;
     }
 
-    /// Gives the items of a wide leaf their places and returns the first.
-    std::uint32_t place_items(std::uint32_t id) {
-        auto& items = out_.reference_of_item;
-        const std::size_t used = items.size() % block_size_;
-        if (used != 0 && used + cuts_.item_count(id) > block_size_) {
-            items.insert(items.end(), block_size_ - used, kNoReference);
-        }
-        const auto first = static_cast<std::uint32_t>(items.size());
-        place_leaves(id);
+    std::uint32_t place(std::uint32_t id) {
+        if (items_ == Items::kIds) return nodes_[id].first;
+        const std::uint32_t first = packer_.place(cuts_.item_count(id));
+        out_.id_of_item.resize(packer_.item_count(), kNoId);
+        list(id, out_.id_of_item.data() + first);
         return first;
     }
+    std::uint32_t* list(std::uint32_t id, std::uint32_t* out) const {
+        const BuildNode& node = nodes_[id];
+        if (!node.is_leaf()) return list(node.second, list(node.first, out));
+        return std::copy_n(ids_ + node.first, node.count, out);
+    }
 
-    void place_leaves(std::uint32_t id) {
-        Node& node = nodes_[id];
-        if (!node.is_leaf()) {
-            place_leaves(id + 1);
-            place_leaves(node.link);
-            return;
+    const BuildNode* nodes_;
+    const std::uint32_t* ids_;
+    const WideCuts& cuts_;
+    Items items_;
+    std::uint32_t hang_at_ = 0;
+    std::vector<Hanging>* hanging_ = nullptr;
+    BlockPacker packer_;
+    Plan out_;
+};
+
+/// Stores the triangles of kBlockSize items; nothing hits the other lanes.
+void fill_block(TriangleBlock& block, const std::uint32_t* ids, MeshView mesh) {
+    block = make_empty_block();
+    for (std::size_t lane = 0; lane < kBlockSize; ++lane) {
+        if (ids[lane] != kNoId) put_triangle(block, lane, mesh, ids[lane]);
+    }
+}
+
+class Writer {
+public:
+    Writer(const Hierarchy& hierarchy, const WideCuts& cuts, MeshView mesh,
+           const std::function<void(std::uint32_t, std::uint32_t)>& place_leaf, WideTree& out)
+        : hierarchy_(hierarchy), cuts_(cuts), mesh_(mesh), place_leaf_(place_leaf), out_(out) {}
+
+    void write(const Plan& plan) const {
+        for (std::size_t i = 0; i < plan.nodes.size(); ++i) {
+            write_node(plan.nodes[i], plan, out_.nodes[plan.first_node + i]);
         }
-        const std::uint32_t first_reference = node.link;
-        node.link = static_cast<std::uint32_t>(out_.reference_of_item.size());
-        for (std::uint32_t i = 0; i < node.count; ++i) {
-            out_.reference_of_item.push_back(first_reference + i);
+        for (std::size_t b = 0; b < plan.block_count(); ++b) {
+            fill_block(out_.blocks[plan.first_block + b], plan.id_of_item.data() + b * kBlockSize,
+                       mesh_);
         }
     }
 
-    static WideNode empty_node() {
+private:
+    void write_node(const PlannedNode& from, const Plan& plan, WideNode& node) const {
+        node = kEmptyNode;
+        const auto first_item = static_cast<std::uint32_t>(plan.first_block * kBlockSize);
+        for (int i = 0; i < from.children.count; ++i) {
+            const std::uint32_t id = from.children.id[i];
+            const Bounds3f& box = hierarchy_.nodes[id].bounds;
+            for (int a = 0; a < 3; ++a) {
+                node.plane[0][a][i] = box.lower[a];
+                node.plane[1][a][i] = box.upper[a];
+            }
+            if (cuts_.is_leaf(id)) {
+                node.child[i] = {from.link[i] + first_item, cuts_.item_count(id)};
+                if (place_leaf_) place_leaves(id, node.child[i].link);
+            } else {
+                node.child[i] = {from.link[i] + static_cast<std::uint32_t>(plan.first_node), 0};
+            }
+        }
+    }
+    std::uint32_t place_leaves(std::uint32_t id, std::uint32_t item) const {
+        const BuildNode& node = hierarchy_.nodes[id];
+        if (!node.is_leaf()) return place_leaves(node.second, place_leaves(node.first, item));
+        place_leaf_(id, item);
+        return item + node.count;
+    }
+
+    static constexpr WideNode kEmptyNode = [] {
         WideNode node = {};
-        std::fill_n(&node.plane[0][0][0], 3 * kWideSize, std::numeric_limits<float>::infinity());
-        std::fill_n(&node.plane[1][0][0], 3 * kWideSize, -std::numeric_limits<float>::infinity());
+        for (int a = 0; a < 3; ++a) {
+            std::fill_n(node.plane[0][a], kWideSize, std::numeric_limits<float>::infinity());
+            std::fill_n(node.plane[1][a], kWideSize, -std::numeric_limits<float>::infinity());
+        }
         std::fill_n(node.child, kWideSize, WideChild{0, 1});
         return node;
-    }
+    }();
 
-    std::span<Node> nodes_;
-    std::uint32_t block_size_;
-    Cuts cuts_;
-    const Parallel& parallel_;
-    Collapsed out_;
+    const Hierarchy& hierarchy_;
+    const WideCuts& cuts_;
+    MeshView mesh_;
+    const std::function<void(std::uint32_t, std::uint32_t)>& place_leaf_;
+    WideTree& out_;
 };
 
 }  // namespace
 
-Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size,
-                   const std::vector<bool>& is_wide_child, const Parallel& parallel) {
-    const auto write = [&](auto cuts) {
-        return Writer(nodes, block_size, std::move(cuts), parallel).write();
-    };
-    return is_wide_child.empty() ? write(BestCuts(nodes, block_size, parallel))
-                                 : write(GivenCuts(nodes, is_wide_child));
+WideTree collapse(const Hierarchy& hierarchy, const WideCuts& cuts, Items items, MeshView mesh,
+                  const std::function<void(std::uint32_t, std::uint32_t)>& place_leaf,
+                  const Parallel& parallel, double part) {
+    const std::uint32_t hang_at = cuts.item_count(0) > kTaskItems ? kTaskItems : 0;
+    std::vector<Hanging> hanging;
+    std::vector<Plan> plans;
+    plans.push_back(Planner(hierarchy, cuts, items).plan(0, hang_at, hanging));
+    plans.resize(1 + hanging.size());
+    const double part_of_task = 0.5 * part / static_cast<double>(plans.size());
+    parallel.for_pieces(hanging.size(), 1, [&](std::size_t i, std::size_t) {
+        std::vector<Hanging> nothing;
+        plans[i + 1] = Planner(hierarchy, cuts, items).plan(hanging[i].root, 0, nothing);
+        parallel.advance(part_of_task);
+    });
+    std::size_t node_count = 0, block_count = 0;
+    for (std::size_t i = 0; i < plans.size(); ++i) {
+        plans[i].first_node = node_count;
+        plans[i].first_block = block_count;
+        if (i > 0) {
+            const Hanging& at = hanging[i - 1];
+            plans[0].nodes[at.parent].link[at.child] = static_cast<std::uint32_t>(node_count);
+        }
+        node_count += plans[i].nodes.size();
+        block_count += plans[i].block_count();
+    }
+    WideTree out;
+    out.nodes.resize(node_count);
+    out.blocks.resize(block_count);
+    const Writer writer(hierarchy, cuts, mesh, place_leaf, out);
+    parallel.for_pieces(plans.size(), 1, [&](std::size_t i, std::size_t) {
+        writer.write(plans[i]);
+        plans[i] = {};
+        parallel.advance(part_of_task);
+    });
+    return out;
 }
 
 }  // namespace packet

@@ -1,28 +1,33 @@
-// From the binary tree to its 8-wide form, where one ray meets 8 boxes at once.
+// From a hierarchy to the 8-wide form, where one ray meets 8 boxes at once. Subtrees are laid out
+// by tasks: each plans its part, which tells how large it is, and writes it once all are planned.
 #pragma once
 
-#include "build/tree.h"
+#include "build/wide_cuts.h"
 
+#include <packet/mesh.h>
+
+#include <functional>
 #include <span>
 #include <vector>
 
 namespace packet {
 
-/// An item that only fills a block up, so that a leaf starts the next.
-inline constexpr std::uint32_t kNoReference = 0xFFFFFFFF;
+/// What items are: lanes of blocks of triangles, or the hierarchy's ids themselves.
+enum class Items : std::uint8_t { kTriangles, kIds };
 
-struct Collapsed {
-    AlignedVector<WideNode> nodes;
-    ScratchVector<std::uint32_t> reference_of_item;
+struct WideTree {
+    ScratchVector<WideNode> nodes;
+    ScratchVector<TriangleBlock> blocks;
 };
 
-/// Joins nodes into wide ones, and leaves into wide leaves of up to `block_size` items, so that the
-/// expected cost of a random ray is least, or as `is_wide_child` says by node, if it is not empty;
-/// then places the items of each wide leaf so that it straddles as few blocks as it can. On entry
-/// the leaves of `nodes` link to references, on return to items. The order of items is that of the
-/// leaves. O(nodes), on
-/// one thread; `parallel` is asked whether to go on.
-[[nodiscard]] Collapsed collapse(std::span<Node> nodes, std::uint32_t block_size,
-                                 const std::vector<bool>& is_wide_child, const Parallel& parallel);
+/// Nodes are in depth-first order but for those near the root, which come first. Leaves that fit
+/// into a block do not straddle two; those that are near each other share blocks, so that these are
+/// well filled. Told of each leaf of the hierarchy, `place_leaf(node, first item)`, if it is not
+/// null, may be called by several threads at once. Parallel; the result does not depend on the
+/// number of threads. `part` of the phase.
+[[nodiscard]] WideTree collapse(const Hierarchy& hierarchy, const WideCuts& cuts, Items items,
+                                MeshView mesh,
+                                const std::function<void(std::uint32_t, std::uint32_t)>& place_leaf,
+                                const Parallel& parallel, double part);
 
 }  // namespace packet

@@ -20,6 +20,8 @@ constexpr std::uint32_t kLongestList = 16;
 // Where a single ray meets eight triangles at once, a node costs as much as eight of them. Trees
 // that know are half as large, and built in two thirds of the time.
 constexpr float kNodeCost = static_cast<float>(kBlockSize);
+// Of the build's time, about.
+constexpr double kShareOfGrid = 0.3, kShareOfTrees = 0.7;
 // Trees of more references than this are built by all threads, one after the other.
 constexpr std::uint32_t kSharedTree = 65536;
 
@@ -40,7 +42,9 @@ public:
         : cells_(cells), mesh_(mesh), options_(std::move(options)), parallel_(parallel) {
         options_.traversal_cost *= kNodeCost;
         for (std::size_t i = 0; i < cells.lists.size(); ++i) {
-            if (cells.lists[i].count > kLongestList) crowded_.push_back(i);
+            if (cells.lists[i].count <= kLongestList) continue;
+            crowded_.push_back(i);
+            reference_count_ += cells.lists[i].count;
         }
     }
 
@@ -48,11 +52,10 @@ public:
     void add_to(Tree& out) {
         trees_.resize(crowded_.size());
         for (std::size_t i = 0; i < trees_.size(); ++i) {
-            if (list(i).count > kSharedTree) trees_[i] = build(list(i), parallel_);
+            if (list(i).count > kSharedTree) trees_[i] = build(list(i), parallel_.threads());
         }
-        const Parallel alone(1);
         parallel_.for_pieces(trees_.size(), 1, [&](std::size_t i, std::size_t) {
-            if (list(i).count <= kSharedTree) trees_[i] = build(list(i), alone);
+            if (list(i).count <= kSharedTree) trees_[i] = build(list(i), 1);
         });
         place(out);
         parallel_.for_pieces(trees_.size(), 1, [&](std::size_t i, std::size_t) {
@@ -69,9 +72,13 @@ private:
         return cells_.lists[crowded_[tree]];
     }
 
-    [[nodiscard]] Tree build(const CellList& in, const Parallel& parallel) const {
+    [[nodiscard]] Tree build(const CellList& in, int threads) const {
+        // Hierarchy and tree advance it by a whole each.
+        const double share = kShareOfTrees / 2.0 * static_cast<double>(in.count) /
+                             static_cast<double>(reference_count_);
+        const Parallel parallel = parallel_.part(threads, share);
         const Bounds3f cell = cells_.space.box_of(cells_.space.cell_of(in.cell));
-        AlignedVector<Reference> references(in.count);
+        ScratchVector<Reference> references(in.count);
         for (std::size_t i = 0; i < in.count; ++i) {
             references[i] = make_reference(mesh_, cells_.ids[in.first + i], cell);
         }
@@ -93,11 +100,11 @@ private:
             wide_nodes += tree.wide_nodes.size();
             blocks += tree.blocks.size();
             out.stats.depth = std::max(out.stats.depth, tree.stats.depth);
+            out.stats.node_count += tree.stats.node_count;
             out.stats.leaf_count += tree.stats.leaf_count - 1;  // its cell is none
             out.stats.sah_cost +=
                 tree.stats.sah_cost * static_cast<double>(tree.bounds.half_area()) / box_area;
         }
-        out.stats.node_count += nodes;
         out.nodes.resize(nodes);
         out.wide_nodes.resize(wide_nodes);
         out.blocks.resize(blocks);
@@ -113,20 +120,22 @@ private:
     BuildOptions options_;  ///< of the trees
     const Parallel& parallel_;
     std::vector<std::size_t> crowded_;  ///< lists that become trees
+    std::size_t reference_count_ = 0;   ///< in these
     std::vector<Tree> trees_;           ///< theirs
 };
 
 }  // namespace
 
-Tree build_grid_of_trees(MeshView mesh, const AlignedVector<Reference>& references,
+Tree build_grid_of_trees(MeshView mesh, const ScratchVector<Reference>& references,
                          const BuildOptions& options, const Parallel& parallel) {
     Tree out;
     if (references.empty()) return out;
     parallel.run([&] {
-        const CellLists cells = sort_into_cells(
-            mesh, references, kCellShare * static_cast<double>(options.grid_density), options,
-            parallel);
-        out = make_grid(cells, kLongestList, mesh, parallel);
+        const Parallel grid = parallel.part(parallel.threads(), kShareOfGrid);
+        const CellLists cells =
+            sort_into_cells(mesh, references,
+                            kCellShare * static_cast<double>(options.grid_density), options, grid);
+        out = make_grid(cells, kLongestList, mesh, grid);
         std::size_t in_lists = 0;
         for (const CellList& list : cells.lists) {
             in_lists += list.count <= kLongestList ? list.count : 0;

@@ -10,7 +10,7 @@ namespace packet {
 /// cells with more than a few triangles a tree by the surface area heuristic over the parts of
 /// triangles in the cell. O(n log n) time, parallel; the result does not depend on the number of
 /// threads.
-[[nodiscard]] Tree build_grid_of_trees(MeshView mesh, const AlignedVector<Reference>& references,
+[[nodiscard]] Tree build_grid_of_trees(MeshView mesh, const ScratchVector<Reference>& references,
                                        const BuildOptions& options, const Parallel& parallel);
 
 }  // namespace packet

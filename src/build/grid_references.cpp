@@ -140,7 +140,7 @@ using Pieces = std::vector<std::vector<CellReference>>;
 
 /// The references of all triangles, by piece; fewer pieces if they come to more than `limit`.
 Pieces find_references(MeshView mesh, const GridSpace& space,
-                       const AlignedVector<Reference>& references, std::size_t limit,
+                       const ScratchVector<Reference>& references, std::size_t limit,
                        const Parallel& parallel) {
     Pieces pieces((references.size() + kGrain - 1) / kGrain);
     std::atomic<std::size_t> total = 0;
@@ -224,7 +224,7 @@ std::vector<CellList> sort_group(std::span<const CellReference> references, std:
 
 }  // namespace
 
-CellLists sort_into_cells(MeshView mesh, const AlignedVector<Reference>& references,
+CellLists sort_into_cells(MeshView mesh, const ScratchVector<Reference>& references,
                           double cells_per_triangle, const BuildOptions& options,
                           const Parallel& parallel) {
     Bounds3f bounds;

@@ -29,7 +29,7 @@ struct CellLists {
 /// its box reaches into (GridSpace::range_of): each of its points lies in such a cell.
 /// O(n + references), 48 bytes of scratch a reference, parallel; the result does not depend on the
 /// number of threads.
-[[nodiscard]] CellLists sort_into_cells(MeshView mesh, const AlignedVector<Reference>& references,
+[[nodiscard]] CellLists sort_into_cells(MeshView mesh, const ScratchVector<Reference>& references,
                                         double cells_per_triangle, const BuildOptions& options,
                                         const Parallel& parallel);
 

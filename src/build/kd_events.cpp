@@ -53,7 +53,7 @@ void sort_events(EventList& events, const Parallel& parallel) {
 }
 
 /// The sorted events of references `first` and after.
-EventList sorted_events(const AlignedVector<Reference>& references, std::size_t first, int axis,
+EventList sorted_events(const ScratchVector<Reference>& references, std::size_t first, int axis,
                         const Parallel& parallel) {
     EventList events;
     events.reserve(2 * (references.size() - first));
@@ -125,7 +125,7 @@ void sweep(const KdCell& cell, int axis, const KdCost& cost, KdPlane& best) {
 EventList child_events(const EventList& parent, const KdChildren& children, std::size_t side,
                        int axis, const Parallel& parallel) {
     parallel.check();
-    const AlignedVector<Reference>& references = children.cell[side].references;
+    const ScratchVector<Reference>& references = children.cell[side].references;
     const EventList parts = sorted_events(references, children.whole[side], axis, parallel);
     EventList out;
     out.reserve(2 * references.size());
@@ -143,7 +143,7 @@ EventList child_events(const EventList& parent, const KdChildren& children, std:
 
 }  // namespace
 
-EventLists make_events(const AlignedVector<Reference>& references, const Parallel& parallel) {
+EventLists make_events(const ScratchVector<Reference>& references, const Parallel& parallel) {
     EventLists lists;
     for_axes(references.size(), parallel, [&](int a) {
         lists[static_cast<std::size_t>(a)] = sorted_events(references, 0, a, parallel);

@@ -13,7 +13,7 @@ namespace packet {
 /// Events name references by 30 bits.
 inline constexpr std::size_t kMaxEventReferences = std::size_t{1} << 30;
 
-[[nodiscard]] EventLists make_events(const AlignedVector<Reference>& references,
+[[nodiscard]] EventLists make_events(const ScratchVector<Reference>& references,
                                      const Parallel& parallel);
 
 /// The cheapest allowed plane, if it is cheaper than a leaf; it needs `cell.events`.

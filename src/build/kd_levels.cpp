@@ -10,7 +10,7 @@ namespace packet {
 static constexpr double kShareOfLarge = 0.35;
 
 /// A level of one cell that holds everything.
-static KdLevel make_root(AlignedVector<Reference> references, const BuildOptions& options) {
+static KdLevel make_root(ScratchVector<Reference> references, const BuildOptions& options) {
     Cell root;
     fill_root(root, std::move(references), options, kMaxReferences);
     KdLevel level;
@@ -19,7 +19,7 @@ static KdLevel make_root(AlignedVector<Reference> references, const BuildOptions
     return level;
 }
 
-Hierarchy build_kd_levels(MeshView mesh, AlignedVector<Reference> references,
+Hierarchy build_kd_levels(MeshView mesh, ScratchVector<Reference> references,
                           const BuildOptions& options, const Parallel& parallel) {
     if (references.empty()) return {};
     const int max_depth = max_cut_depth(references.size());

@@ -14,7 +14,7 @@
 namespace packet {
 
 /// As build_kd_tree() by KdRule::kSah, of at most kMaxReferences references.
-[[nodiscard]] Hierarchy build_kd_levels(MeshView mesh, AlignedVector<Reference> references,
+[[nodiscard]] Hierarchy build_kd_levels(MeshView mesh, ScratchVector<Reference> references,
                                         const BuildOptions& options, const Parallel& parallel);
 
 }  // namespace packet

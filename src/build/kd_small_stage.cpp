@@ -176,8 +176,9 @@ std::vector<Task> make_tasks(std::span<const KdLevel> levels) {
 
 /// Copies to the hierarchy what has become of the task's cells.
 void emit(Task& task, Hierarchy& out) {
-    std::copy(task.references.begin(), task.references.end(),
-              out.references.begin() + static_cast<std::ptrdiff_t>(task.first_reference));
+    for (std::size_t i = 0; i < task.references.size(); ++i) {
+        out.ids[task.first_reference + i] = task.references[i].id;
+    }
     BuildNode* const nodes = out.nodes.data() + task.first_node;
     for (std::size_t i = 0; i < task.nodes.size(); ++i) {
         const BuildNode& node = nodes[i] = task.nodes[i];
@@ -213,7 +214,7 @@ Hierarchy run_small_stage(MeshView mesh, KdLargeStage large, int max_cut_depth,
     }
     Hierarchy out{std::move(large.nodes), {}};
     out.nodes.resize(node_count);
-    out.references.resize(reference_count);
+    out.ids.resize(reference_count);
     parallel.for_pieces(tasks.size(), 1, [&](std::size_t i, std::size_t) { emit(tasks[i], out); });
     return out;
 }

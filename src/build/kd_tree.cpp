@@ -32,7 +32,7 @@ public:
         : rule_(rule), mesh_(mesh), options_(options), parallel_(parallel) {}
 
     /// With at most `most` references.
-    Hierarchy build(AlignedVector<Reference> references, std::size_t most) {
+    Hierarchy build(ScratchVector<Reference> references, std::size_t most) {
         if (references.empty()) return {};
         max_cut_depth_ = max_cut_depth(references.size());
         KdCell root;
@@ -148,7 +148,7 @@ private:
 
 }  // namespace
 
-Hierarchy build_kd_tree(KdRule rule, MeshView mesh, AlignedVector<Reference> references,
+Hierarchy build_kd_tree(KdRule rule, MeshView mesh, ScratchVector<Reference> references,
                         const BuildOptions& options, const Parallel& parallel) {
     const bool by_levels = rule == KdRule::kSah && options.kd_build == KdBuild::kBreadthFirst;
     const std::size_t most =

@@ -21,7 +21,7 @@ enum class KdRule {
 /// the result does not depend on the number of threads. Throws Error{kTooLarge} for more than 2^30
 /// triangles by kSah and sorted events.
 [[nodiscard]] Hierarchy build_kd_tree(KdRule rule, MeshView mesh,
-                                      AlignedVector<Reference> references,
+                                      ScratchVector<Reference> references,
                                       const BuildOptions& options, const Parallel& parallel);
 
 }  // namespace packet

@@ -1,5 +1,6 @@
 #include "build/object_split.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -30,7 +31,7 @@ struct Bins {
 
     void add(const Reference& r, const Binning& binning) {
         const LaneBox box = lane_box(r);
-        const Binning::BinIds ids = binning.bins(r);
+        const Binning::BinIds ids = binning.bins(centroid2_lanes(r));
         for (int a = 0; a < 3; ++a) {
             Bin& at = bin[ids.axis[a]];
             at.box[a].extend(box);
@@ -45,14 +46,118 @@ struct Bins {
     }
 };
 
+/// Few references along each axis, by their centroids and then as they come.
+struct Orders {
+    std::uint8_t axis[3][kFewReferences];
+
+    explicit Orders(ReferenceSpan refs) {
+        const std::size_t count = refs.size();
+        const Lanes zero(0.0f), one(1.0f);
+        Lanes centroid[kFewReferences], rank[kFewReferences];
+        for (std::size_t i = 0; i < count; ++i) {
+            centroid[i] = centroid2_lanes(refs[i]);
+            rank[i] = zero;
+            for (std::size_t j = 0; j < i; ++j) {
+                const Lanes is_after = xsimd::select(centroid[i] < centroid[j], one, zero);
+                rank[j] += is_after;
+                rank[i] += one - is_after;
+            }
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            alignas(16) std::int32_t place[4];
+            xsimd::to_int(rank[i]).store_aligned(place);
+            for (int a = 0; a < 3; ++a) axis[a][place[a]] = static_cast<std::uint8_t>(i);
+        }
+    }
+};
+
+/// Tries every place in the orders.
+ObjectSplit split_few(ReferenceSpan refs) {
+    const std::size_t count = refs.size();
+    const Orders orders(refs);
+    const auto extend = [&](LaneBox(&box)[3], std::size_t place) {
+        for (int a = 0; a < 3; ++a) box[a].extend(lane_box(refs[orders.axis[a][place]]));
+    };
+    Lanes cost_above[kFewReferences];
+    LaneBox above[3], below[3];
+    for (std::size_t i = count - 1; i > 0; --i) {
+        extend(above, i);
+        cost_above[i] = half_areas(above) * Lanes(static_cast<float>(count - i));
+    }
+    alignas(16) float least[4], place[4];
+    Lanes best(std::numeric_limits<float>::infinity()), best_place(0.0f);
+    for (std::size_t i = 1; i < count; ++i) {
+        extend(below, i - 1);
+        const Lanes here(static_cast<float>(i));
+        const Lanes cost = half_areas(below) * here + cost_above[i];
+        const auto is_best = cost < best;
+        best = xsimd::select(is_best, cost, best);
+        best_place = xsimd::select(is_best, here, best_place);
+    }
+    best.store_aligned(least);
+    best_place.store_aligned(place);
+    ObjectSplit out;
+    for (int a = 0; a < 3; ++a) {
+        if (!(least[a] < out.cost)) continue;
+        out.cost = least[a];
+        out.axis = a;
+        out.place = static_cast<int>(place[a]);
+    }
+    if (out.axis < 0) return out;
+    std::copy_n(orders.axis[out.axis], count, out.order);
+    LaneBox box[2];
+    for (std::size_t i = 0; i < count; ++i) {
+        box[i < static_cast<std::size_t>(out.place) ? 0 : 1].extend(lane_box(refs[out.order[i]]));
+    }
+    for (int side = 0; side < 2; ++side) out.bounds[side] = box[side].bounds();
+    return out;
+}
+
+/// Sorts few references along the split's axis; yields how many go first.
+std::size_t part_few(ReferenceSpan refs, const ObjectSplit& split) {
+    Reference sorted[kFewReferences];
+    for (std::size_t i = 0; i < refs.size(); ++i) sorted[i] = refs[split.order[i]];
+    std::copy_n(sorted, refs.size(), refs.begin());
+    return static_cast<std::size_t>(split.place);
+}
+
+[[nodiscard]] Bounds3f centroid_bounds(ReferenceSpan refs) {
+    LaneBox out;
+    for (const Reference& r : refs) {
+        const Lanes c = centroid2_lanes(r);
+        out.extend(c, c);
+    }
+    return out.bounds();
+}
+
+/// Sorts references by their bins; yields how many go first, and fills the bounds of each side's
+/// centroids. Without branches: where a reference goes is anybody's guess.
+std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, NodeBounds (&bounds)[2]) {
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < refs.size(); ++i) {
+        const Reference r = refs[i];
+        const bool is_first = split.binning.bins(centroid2_lanes(r)).axis[split.axis] < split.place;
+        refs[i] = refs[first];
+        refs[first] = r;
+        first += is_first ? 1 : 0;
+    }
+    const ReferenceSpan sides[2] = {refs.first(first), refs.subspan(first)};
+    for (int side = 0; side < 2; ++side) {
+        if (sides[side].size() > kFewReferences)
+            bounds[side].centroids = centroid_bounds(sides[side]);
+    }
+    return first;
+}
+
 }  // namespace
 
-ObjectSplit find_object_split(ReferenceSpan refs, const Binning& binning,
-                              const Parallel& parallel) {
+ObjectSplit find_object_split(const NodeRange& node, const Parallel& parallel) {
+    if (node.refs.size() <= kFewReferences) return split_few(node.refs);
     ObjectSplit best;
+    const Binning& binning = best.binning = Binning(node.bounds.centroids);
     if (!binning.splits_any()) return best;
     const Bins bins = fold_references<Bins>(
-        refs, parallel,
+        node.refs, parallel,
         [&](Bins& out, ReferenceSpan piece) {
             for (const Reference& r : piece) out.add(r, binning);
         },
@@ -62,10 +167,11 @@ ObjectSplit find_object_split(ReferenceSpan refs, const Binning& binning,
         if (!binning.splits(a) || !(borders.cost[a] < best.cost)) continue;
         best.cost = borders.cost[a];
         best.axis = a;
-        best.bin = static_cast<int>(borders.bin[a]);
+        best.place = static_cast<int>(borders.bin[a]);
     }
-    best.bounds[0] = join_bins(bins.bin, best.axis, 0, best.bin);
-    best.bounds[1] = join_bins(bins.bin, best.axis, best.bin, kBinCount);
+    if (best.axis < 0) return best;
+    best.bounds[0] = join_bins(bins.bin, best.axis, 0, best.place);
+    best.bounds[1] = join_bins(bins.bin, best.axis, best.place, kBinCount);
     return best;
 }
 
@@ -77,28 +183,20 @@ bool is_leaf(const NodeRange& node, float split_cost, const BuildOptions& option
     return !(options.traversal_cost * area + options.intersection_cost * split_cost < as_leaf);
 }
 
-Halves split_objects(const NodeRange& node, const Binning& binning, const ObjectSplit& split,
-                     int depth, const Parallel& parallel) {
+Halves split_objects(const NodeRange& node, const ObjectSplit& split, int depth,
+                     const Parallel& parallel) {
     if (split.axis >= 0) {
-        LaneBounds bounds[2];
-        Reference* first = node.refs.data();
-        Reference* last = first + node.refs.size();
-        // Each is looked at once: where it goes and what bounds it there.
-        for (;;) {
-            const auto is_first = [&](const Reference& r) {
-                return binning.bins(r).axis[split.axis] < split.bin;
-            };
-            for (; first != last && is_first(*first); ++first) bounds[0].extend(*first);
-            for (; first != last && !is_first(last[-1]); --last) bounds[1].extend(last[-1]);
-            if (first == last) break;
-            std::swap(*first, last[-1]);
-        }
-        const auto count = static_cast<std::size_t>(first - node.refs.data());
-        if (is_allowed(count, node.refs.size(), depth)) {
-            return divide(node, count, bounds[0].node_bounds(), bounds[1].node_bounds());
+        NodeBounds bounds[2];
+        const std::size_t first = node.refs.size() <= kFewReferences
+                                      ? part_few(node.refs, split)
+                                      : part_by_bins(node.refs, split, bounds);
+        bounds[0].box = split.bounds[0];
+        bounds[1].box = split.bounds[1];
+        if (is_allowed(first, node.refs.size(), depth)) {
+            return divide(node, first, bounds[0], bounds[1]);
         }
     }
-    return divide(node, halve(node.refs, node.bounds.centroids), parallel);
+    return divide(node, halve(node), parallel);
 }
 
 }  // namespace packet

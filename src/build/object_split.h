@@ -15,10 +15,15 @@
 
 namespace packet {
 
+/// Up to so many references all places between neighbours along each axis are tried, which then
+/// takes no longer than bins, and half the time if they are 8.
+inline constexpr std::size_t kFewReferences = 8;
+
 /// Maps centroids to bins. Axes along which centroids do not differ enough to be told apart in
 /// float have scale 0, and all in bin 0.
 class Binning {
 public:
+    Binning() = default;
     explicit Binning(const Bounds3f& centroids);
 
     [[nodiscard]] bool splits(int axis) const noexcept { return scale_vector_[axis] > 0.0f; }
@@ -28,8 +33,9 @@ public:
     struct BinIds {
         alignas(16) std::int32_t axis[4];
     };
-    [[nodiscard]] PACKET_INLINE BinIds bins(const Reference& r) const noexcept {
-        const Lanes x = (centroid2_lanes(r) - origin_) * scale_;
+    /// Of what has this doubled centroid.
+    [[nodiscard]] PACKET_INLINE BinIds bins(Lanes centroid2) const noexcept {
+        const Lanes x = (centroid2 - origin_) * scale_;
         BinIds out;
         xsimd::to_int(xsimd::min(x, Lanes(kBinCount - 0.5f))).store_aligned(out.axis);
         return out;
@@ -43,20 +49,22 @@ private:
 struct ObjectSplit {
     float cost = std::numeric_limits<float>::infinity();  ///< of both halves: area times count
     int axis = -1;                                        ///< -1: none
-    int bin = 0;                                          ///< bins below this go first
-    Bounds3f bounds[2];                                   ///< of the halves
+    int place = 0;                       ///< bins below this go first, or so many if they are few
+    Bounds3f bounds[2];                  ///< of the halves
+    Binning binning;                     ///< if they are not few
+    std::uint8_t order[kFewReferences];  ///< if they are few: along the axis
 };
 
 /// The cheapest split, if centroids can be told apart. O(references), on several threads if they
 /// are many.
-[[nodiscard]] ObjectSplit find_object_split(ReferenceSpan refs, const Binning& binning,
-                                            const Parallel& parallel);
+[[nodiscard]] ObjectSplit find_object_split(const NodeRange& node, const Parallel& parallel);
 
 /// Whether a node is better a leaf, and may be one, than split at a cost of area times count.
 [[nodiscard]] bool is_leaf(const NodeRange& node, float split_cost, const BuildOptions& options);
 
 /// Parts the references; where a split is none, or not allowed at this depth, into equal halves.
-[[nodiscard]] Halves split_objects(const NodeRange& node, const Binning& binning,
-                                   const ObjectSplit& split, int depth, const Parallel& parallel);
+/// Halves of few references do not get the bounds of their centroids, which nothing asks for.
+[[nodiscard]] Halves split_objects(const NodeRange& node, const ObjectSplit& split, int depth,
+                                   const Parallel& parallel);
 
 }  // namespace packet

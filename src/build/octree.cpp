@@ -117,7 +117,7 @@ public:
     Builder(MeshView mesh, const BuildOptions& options, const Parallel& parallel)
         : cutter_(mesh), options_(options), parallel_(parallel) {}
 
-    Hierarchy build(AlignedVector<Reference> references) const {
+    Hierarchy build(ScratchVector<Reference> references) const {
         if (references.empty()) return {};
         OctreeCell root;
         fill_root(root, std::move(references), options_, kMaxReferences);
@@ -228,7 +228,7 @@ private:
     }
 
     Parts cut(const OctreeCell& cell) const {
-        const AlignedVector<Reference>& refs = cell.references;
+        const ScratchVector<Reference>& refs = cell.references;
         const glm::vec3 middle = cell.box.center();
         std::vector<std::array<Cell, kOctants>> pieces((refs.size() + kTaskSize - 1) / kTaskSize);
         parallel_.for_pieces(refs.size(), kTaskSize, [&](std::size_t begin, std::size_t end) {
@@ -281,7 +281,7 @@ private:
             for (const Reference& r : refs) parts[0].add(r);
             return;
         }
-        const std::size_t first = halve(refs, measure(refs, parallel_).centroids);
+        const std::size_t first = halve({refs, measure(refs, parallel_)});
         deal(refs.first(first), parts.first(parts.size() / 2));
         deal(refs.subspan(first), parts.last(parts.size() / 2));
     }
@@ -293,7 +293,7 @@ private:
 
 }  // namespace
 
-Hierarchy build_octree(MeshView mesh, AlignedVector<Reference> references,
+Hierarchy build_octree(MeshView mesh, ScratchVector<Reference> references,
                        const BuildOptions& options, const Parallel& parallel) {
     return Builder(mesh, options, parallel).build(std::move(references));
 }

@@ -15,7 +15,7 @@ namespace packet {
 /// dealt out to nodes that may overlap. Every leaf holds at most `options.max_leaf_size`
 /// references; no leaf is deeper than kMaxDepth. Brings its own 8-wide form, a node for each cell.
 /// O(n log n) time; parallel; the result does not depend on the number of threads.
-[[nodiscard]] Hierarchy build_octree(MeshView mesh, AlignedVector<Reference> references,
+[[nodiscard]] Hierarchy build_octree(MeshView mesh, ScratchVector<Reference> references,
                                      const BuildOptions& options, const Parallel& parallel);
 
 }  // namespace packet

@@ -14,22 +14,35 @@
 
 namespace packet {
 
-/// When a node is a leaf: when that is cheaper, and it is not too large.
-struct LeafRule {
-    float traversal_cost, intersection_cost;
-    std::uint32_t max_leaf_size;
-
-    explicit LeafRule(const BuildOptions& options)
-        : traversal_cost(options.traversal_cost),
-          intersection_cost(options.intersection_cost),
-          max_leaf_size(static_cast<std::uint32_t>(options.max_leaf_size)) {}
-};
-
 /// What a node's parent needs to know of it beside its box.
 struct RadixSubtree {
     std::uint32_t first, count;  ///< the references it covers
     float cost;                  ///< as in BuildStats::sah_cost, times the area of the root
     int height;                  ///< edges to its deepest leaf
+};
+
+/// When a node is a leaf: when that is cheaper, and it is not too large.
+struct LeafRule {
+    float traversal_cost, intersection_cost;
+    std::uint32_t max_leaf_size;
+
+    /// A node of two subtrees. It is a leaf, of height 0, if the rule says so.
+    [[nodiscard]] constexpr RadixSubtree join(const RadixSubtree& a, const RadixSubtree& b,
+                                              float area) const {
+        const std::uint32_t count = a.count + b.count;
+        const float as_leaf = intersection_cost * area * static_cast<float>(count);
+        const float as_node = traversal_cost * area + a.cost + b.cost;
+        if (count <= max_leaf_size && !(as_node < as_leaf)) return {a.first, count, as_leaf, 0};
+        return {a.first, count, as_node, 1 + std::max(a.height, b.height)};
+    }
+    [[nodiscard]] constexpr RadixSubtree leaf(std::uint32_t item, float area) const {
+        return {item, 1, intersection_cost * area, 0};
+    }
+
+    explicit LeafRule(const BuildOptions& options)
+        : traversal_cost(options.traversal_cost),
+          intersection_cost(options.intersection_cost),
+          max_leaf_size(static_cast<std::uint32_t>(options.max_leaf_size)) {}
 };
 
 /// Arrays over n sorted references. Inner nodes have the slots below n - 1, and leaf i has slot
@@ -71,16 +84,9 @@ struct RadixHierarchy {
         RadixSubtree& subtree = subtrees[slot];
         node.bounds = nodes[node.first].bounds;
         node.bounds.extend(nodes[node.second].bounds);
-        const RadixSubtree first = subtree_at(node.first, rule);
-        const RadixSubtree second = subtree_at(node.second, rule);
-        const float area = node.bounds.half_area();
-        const float leaf_cost = rule.intersection_cost * area * static_cast<float>(subtree.count);
-        subtree.cost = rule.traversal_cost * area + first.cost + second.cost;
-        subtree.height = 1 + std::max(first.height, second.height);
-        if (subtree.count > rule.max_leaf_size) return;
-        if (subtree.cost < leaf_cost) return;
-        subtree.cost = leaf_cost;
-        subtree.height = 0;
+        subtree = rule.join(subtree_at(node.first, rule), subtree_at(node.second, rule),
+                            node.bounds.half_area());
+        if (subtree.height != 0) return;
         node.first = subtree.first;
         node.count = subtree.count;
     }
@@ -89,8 +95,7 @@ private:
     [[nodiscard]] constexpr RadixSubtree subtree_at(std::uint32_t slot,
                                                     const LeafRule& rule) const {
         if (slot < first_leaf()) return subtrees[slot];
-        const float area = nodes[slot].bounds.half_area();
-        return {nodes[slot].first, 1, rule.intersection_cost * area, 0};
+        return rule.leaf(nodes[slot].first, nodes[slot].bounds.half_area());
     }
 };
 

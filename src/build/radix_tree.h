@@ -56,6 +56,20 @@ public:
         if (j < 0 || j >= static_cast<std::int64_t>(size())) return -1;
         return packet::common_bits(code(i), code(j), i, j, dropped_bits_);
     }
+    /// Where the tree parts the range: the last item that goes to the first child.
+    [[nodiscard]] std::uint32_t split(std::uint32_t first, std::uint32_t last) const noexcept {
+        const int bits = common_bits(first, last);
+        std::uint32_t end = last;  // the first that has no more in common with `first`
+        while (end - first > 1) {
+            const std::uint32_t middle = first + (end - first) / 2;
+            if (common_bits(first, middle) > bits) {
+                first = middle;
+            } else {
+                end = middle;
+            }
+        }
+        return first;
+    }
 
 private:
     [[nodiscard]] Code code(std::int64_t i) const noexcept {

@@ -37,6 +37,15 @@ static Piece collect_piece(MeshView mesh, std::size_t begin, std::size_t end, Re
     return piece;
 }
 
+ScratchVector<std::uint32_t> ids_of(std::span<const Reference> references,
+                                    const Parallel& parallel) {
+    ScratchVector<std::uint32_t> out(references.size());
+    parallel.for_pieces(references.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) out[i] = references[i].id;
+    });
+    return out;
+}
+
 References collect_references(MeshView mesh, const Parallel& parallel) {
     const std::size_t count = mesh.triangles.size();
     References out;

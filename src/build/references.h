@@ -8,6 +8,7 @@
 #include <packet/mesh.h>
 
 #include <cstdint>
+#include <span>
 
 namespace packet {
 
@@ -23,10 +24,14 @@ struct Reference {
 static_assert(sizeof(Reference) == 32);
 
 struct References {
-    AlignedVector<Reference> items;
+    ScratchVector<Reference> items;
     Bounds3f bounds;
     SkippedTriangles skipped;
 };
+
+/// Copies the ids of references. O(n), parallel.
+[[nodiscard]] ScratchVector<std::uint32_t> ids_of(std::span<const Reference> references,
+                                                  const Parallel& parallel);
 
 /// One reference a triangle that can be hit, in order of the triangles. O(n), parallel.
 [[nodiscard]] References collect_references(MeshView mesh, const Parallel& parallel);

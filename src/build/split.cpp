@@ -17,8 +17,10 @@ NodeBounds measure(ReferenceSpan refs, const Parallel& parallel) {
         [](NodeBounds& a, const NodeBounds& b) { a.extend(b); });
 }
 
-std::size_t halve(ReferenceSpan refs, const Bounds3f& centroids) {
-    const glm::vec3 extent = centroids.extent();
+std::size_t halve(const NodeRange& node) {
+    const ReferenceSpan refs = node.refs;
+    const Bounds3f& centroids = node.bounds.centroids;
+    const glm::vec3 extent = (centroids.empty() ? node.bounds.box : centroids).extent();
     const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
                      : extent.y >= extent.z                       ? 1
                                                                   : 2;

@@ -76,9 +76,10 @@ template <class Result, class FoldPiece, class Join>
     return first != 0 && first != count && fits_depth(depth + 1, std::max(first, count - first));
 }
 
-/// Sorts half of the references to each side, by centroid along the widest axis, then by id.
+/// Sorts half of the references to each side, by centroid along the axis on which centroids are
+/// widest (or the box, if theirs are not known), then by id.
 /// Returns where the second half starts.
-[[nodiscard]] std::size_t halve(ReferenceSpan refs, const Bounds3f& centroids);
+[[nodiscard]] std::size_t halve(const NodeRange& node);
 
 /// The first references and the others, with their bounds; each gets room in proportion.
 [[nodiscard]] Halves divide(const NodeRange& node, std::size_t first, const Parallel& parallel);
@@ -92,7 +93,7 @@ template <class Split>
 class TopDownBuilder {
 public:
     /// Splitting may add up to `room` references.
-    TopDownBuilder(AlignedVector<Reference> references, std::size_t room, const Parallel& parallel,
+    TopDownBuilder(ScratchVector<Reference> references, std::size_t room, const Parallel& parallel,
                    Split split)
         : parallel_(parallel),
           split_(std::move(split)),
@@ -104,8 +105,15 @@ public:
     }
 
     [[nodiscard]] Hierarchy build() && {
-        if (count_ != 0) parallel_.run([&] { build_root(); });
-        return {std::move(nodes_), std::move(references_)};
+        Hierarchy out;
+        if (count_ == 0) return out;
+        parallel_.run([&] {
+            build_root();
+            out.ids = ids_of(references_, parallel_);
+        });
+        nodes_.resize(used_);
+        out.nodes = std::move(nodes_);
+        return out;
     }
 
 private:
@@ -185,7 +193,7 @@ private:
     const Parallel& parallel_;
     Split split_;
     std::size_t count_;
-    AlignedVector<Reference> references_;
+    ScratchVector<Reference> references_;
     ScratchVector<BuildNode> nodes_;
     std::atomic<std::uint32_t> used_ = 1;  ///< nodes; the root has the first
 };

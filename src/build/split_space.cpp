@@ -132,7 +132,7 @@ std::optional<Halves> split_space(MeshView mesh, const NodeRange& node, const Sp
     if (is_allowed(first, count, depth)) return divide(all, first, bounds[0], bounds[1]);
     // What the plane seemed to part is all on one side, where nothing was cut.
     all.bounds.extend(bounds[1]);
-    return divide(all, halve(all.refs, all.bounds.centroids), parallel);
+    return divide(all, halve(all), parallel);
 }
 
 }  // namespace packet

@@ -17,15 +17,15 @@ struct Subtree {
         std::unique_ptr<Subtree> tree;
     };
     std::vector<BuildNode> nodes;  ///< nodes[0] is the root
-    AlignedVector<Reference> references;
+    std::vector<std::uint32_t> ids;
     std::vector<bool> is_wide_child;
     std::vector<Hanging> hanging;
 
     /// Makes a node a leaf of `items`.
-    void fill_leaf(std::uint32_t node, const AlignedVector<Reference>& items) {
-        nodes[node].first = static_cast<std::uint32_t>(references.size());
+    void fill_leaf(std::uint32_t node, const ScratchVector<Reference>& items) {
+        nodes[node].first = static_cast<std::uint32_t>(ids.size());
         nodes[node].count = static_cast<std::uint32_t>(items.size());
-        references.insert(references.end(), items.begin(), items.end());
+        for (const Reference& item : items) ids.push_back(item.id);
     }
     /// Hangs a subtree, yet to be filled, on a node.
     Subtree& hang(std::uint32_t parent, int side) {
@@ -38,13 +38,13 @@ struct Subtree {
 inline std::uint32_t append(Subtree& from, Hierarchy& to, const Parallel& parallel) {
     parallel.check();
     const auto base = static_cast<std::uint32_t>(to.nodes.size());
-    const auto first = static_cast<std::uint32_t>(to.references.size());
+    const auto first = static_cast<std::uint32_t>(to.ids.size());
     for (BuildNode node : from.nodes) {
         node.first += node.is_leaf() ? first : base;
         node.second += base;
         to.nodes.push_back(node);
     }
-    to.references.insert(to.references.end(), from.references.begin(), from.references.end());
+    to.ids.insert(to.ids.end(), from.ids.begin(), from.ids.end());
     to.is_wide_child.insert(to.is_wide_child.end(), from.is_wide_child.begin(),
                             from.is_wide_child.end());
     for (const Subtree::Hanging& hanging : from.hanging) {
@@ -56,18 +56,18 @@ inline std::uint32_t append(Subtree& from, Hierarchy& to, const Parallel& parall
 }
 
 /// Adds up what a subtree and what hangs on it hold.
-inline void count(const Subtree& tree, std::size_t& nodes, std::size_t& references) {
+inline void count(const Subtree& tree, std::size_t& nodes, std::size_t& ids) {
     nodes += tree.nodes.size();
-    references += tree.references.size();
-    for (const Subtree::Hanging& hanging : tree.hanging) count(*hanging.tree, nodes, references);
+    ids += tree.ids.size();
+    for (const Subtree::Hanging& hanging : tree.hanging) count(*hanging.tree, nodes, ids);
 }
 
 [[nodiscard]] inline Hierarchy to_hierarchy(Subtree tree, const Parallel& parallel) {
     Hierarchy out;
-    std::size_t nodes = 0, references = 0;
-    count(tree, nodes, references);
+    std::size_t nodes = 0, ids = 0;
+    count(tree, nodes, ids);
     out.nodes.reserve(nodes);
-    out.references.reserve(references);
+    out.ids.reserve(ids);
     append(tree, out, parallel);
     return out;
 }

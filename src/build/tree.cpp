@@ -1,12 +1,10 @@
 #include "build/tree.h"
 
 #include "build/collapse.h"
-#include "build/triangle_block.h"
 
 #include <packet/error.h>
 
-#include <algorithm>
-#include <limits>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -15,109 +13,78 @@ namespace packet {
 namespace {
 
 // Of the time that making a tree of a hierarchy takes, about.
-constexpr double kShareOfNodes = 0.3, kShareOfCollapse = 0.5;
+constexpr double kShareOfCuts = 0.2, kShareOfCollapse = 0.8;
 
-Node make_node(const BuildNode& source) {
+Node make_node(const BuildNode& source, std::uint32_t link) {
     Node node = {};
     for (int a = 0; a < 3; ++a) {
         node.plane[0][a] = source.bounds.lower[a];
         node.plane[1][a] = source.bounds.upper[a];
     }
-    node.link = source.first;  // a leaf's first reference, until its items are placed
+    node.link = link;
     node.count = source.count;
     return node;
 }
 
-/// Adds a node to the statistics: its cost counts as often as a random ray that meets the root's
-/// box meets its own.
-void count_node(const BuildNode& node, int depth, double root_area, const BuildOptions& options,
-                BuildStats& stats) {
-    const double share = static_cast<double>(node.bounds.half_area()) / root_area;
-    stats.depth = std::max(stats.depth, depth);
-    ++stats.node_count;
-    stats.leaf_count += node.is_leaf();
-    stats.sah_cost += share * (node.is_leaf() ? static_cast<double>(options.intersection_cost) *
-                                                    static_cast<double>(node.count)
-                                              : static_cast<double>(options.traversal_cost));
-}
-
-/// Of a large array what is not used is never touched, and so takes no memory, but copying it takes
-/// long.
-template <class T>
-void trim(AlignedVector<T>& nodes) {
-    constexpr std::size_t kLarge = std::size_t{4} << 20;
-    if (nodes.capacity() * sizeof(T) < kLarge) nodes.shrink_to_fit();
-}
-
-/// The binary nodes, depth first. Yields which of them are wide children, if the builder says so.
-/// Iterative: small stacks of threads are not ours to fill.
-std::vector<bool> linearize(const Hierarchy& hierarchy, const BuildOptions& options,
-                            const Parallel& parallel, Tree& tree) {
+/// The binary nodes, depth first. Iterative: small stacks of threads are not ours to fill.
+ScratchVector<Node> linearize(const Hierarchy& hierarchy, std::size_t node_count,
+                              std::span<const std::uint32_t> first_item, const Parallel& parallel) {
     constexpr std::size_t kCheckInterval = 4096;
     struct Pending {
         std::uint32_t source, parent;
-        int depth;
     };
     constexpr std::uint32_t kNoParent = 0xFFFFFFFF;
-    const double root_area =
-        std::max(static_cast<double>(tree.bounds.half_area()), std::numeric_limits<double>::min());
-    std::vector<bool> is_wide_child;
-    tree.nodes.reserve(hierarchy.nodes.size());
-    std::vector<Pending> stack = {{0, kNoParent, 0}};
-    while (!stack.empty()) {
+    ScratchVector<Node> out(node_count);
+    std::vector<Pending> stack = {{0, kNoParent}};
+    for (std::uint32_t index = 0; !stack.empty(); ++index) {
         const Pending p = stack.back();
         stack.pop_back();
         const BuildNode& source = hierarchy.nodes[p.source];
-        const auto index = static_cast<std::uint32_t>(tree.nodes.size());
         if (index % kCheckInterval == 0) parallel.check();
-        if (p.parent != kNoParent) tree.nodes[p.parent].link = index;
-        tree.nodes.push_back(make_node(source));
-        if (!hierarchy.is_wide_child.empty()) {
-            is_wide_child.push_back(hierarchy.is_wide_child[p.source]);
-        }
-        count_node(source, p.depth, root_area, options, tree.stats);
+        if (p.parent != kNoParent) out[p.parent].link = index;
+        out[index] = make_node(source, source.is_leaf() ? first_item[p.source] : 0);
         if (source.is_leaf()) continue;
-        stack.push_back({source.second, index, p.depth + 1});
-        stack.push_back({source.first, kNoParent, p.depth + 1});
+        stack.push_back({source.second, index});
+        stack.push_back({source.first, kNoParent});
     }
-    trim(tree.nodes);
-    return is_wide_child;
+    return out;
 }
 
-/// Both forms of the tree, and where the references become items.
-Collapsed make_nodes(const Hierarchy& hierarchy, const BuildOptions& options,
-                     std::uint32_t block_size, const Parallel& parallel, Tree& tree) {
-    if (hierarchy.references.empty()) return {};
+Tree lay_out(const Hierarchy& hierarchy, Items items, MeshView mesh, const BuildOptions& options,
+             const Parallel& parallel) {
+    Tree tree;
+    if (hierarchy.ids.empty()) return tree;
+    const std::uint32_t block_size = items == Items::kTriangles ? kBlockSize : 1;
+    const WideCuts cuts(hierarchy, block_size, parallel, kShareOfCuts);
     tree.bounds = hierarchy.nodes[0].bounds;
-    const std::vector<bool> is_wide_child = linearize(hierarchy, options, parallel, tree);
-    parallel.advance(kShareOfNodes);
-    Collapsed collapsed = collapse(tree.nodes, block_size, is_wide_child, parallel);
-    parallel.advance(kShareOfCollapse);
-    tree.wide_nodes = std::move(collapsed.nodes);
-    trim(tree.wide_nodes);
-    return collapsed;
-}
-
-/// Stores the triangles of up to kBlockSize items; nothing hits the other lanes.
-void fill_block(TriangleBlock& block, std::span<const std::uint32_t> items, MeshView mesh,
-                std::span<const Reference> references) {
-    block = make_empty_block();
-    for (std::size_t lane = 0; lane < items.size(); ++lane) {
-        if (items[lane] != kNoReference) {
-            put_triangle(block, lane, mesh, references[items[lane]].id);
-        }
+    tree.stats = cuts.stats(options);
+    ScratchVector<std::uint32_t> first_item(options.keep_binary_nodes ? hierarchy.nodes.size() : 0);
+    std::function<void(std::uint32_t, std::uint32_t)> place_leaf;
+    if (options.keep_binary_nodes) {
+        place_leaf = [&](std::uint32_t node, std::uint32_t item) { first_item[node] = item; };
     }
+    WideTree wide;
+    parallel.run([&] {
+        wide = collapse(hierarchy, cuts, items, mesh, place_leaf, parallel, kShareOfCollapse);
+    });
+    tree.wide_nodes = std::move(wide.nodes);
+    tree.blocks = std::move(wide.blocks);
+    if (options.keep_binary_nodes) {
+        tree.nodes = linearize(hierarchy, tree.stats.node_count, first_item, parallel);
+    }
+    tree.stats.bytes = tree.byte_count();
+    return tree;
 }
 
 }  // namespace
 
 TreeView Tree::view() const noexcept {
     TreeView out;
-    out.nodes = nodes.data();
+    out.nodes = nodes.empty() ? nullptr : nodes.data();
     out.wide_nodes = wide_nodes.data();
     out.blocks = blocks.data();
     out.grid = grid.view();
-    out.node_count = static_cast<std::uint32_t>(nodes.size());
+    out.node_count = static_cast<std::uint32_t>(nodes.empty() ? wide_nodes.size() : nodes.size());
     for (int a = 0; a < 3 && !out.is_empty(); ++a) {
         out.lower[a] = bounds.lower[a];
         out.upper[a] = bounds.upper[a];
@@ -132,30 +99,11 @@ std::size_t Tree::byte_count() const noexcept {
 
 Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
                const Parallel& parallel) {
-    constexpr std::size_t kGrain = 512;
-    Tree tree;
-    const Collapsed collapsed = make_nodes(hierarchy, options, kBlockSize, parallel, tree);
-    const std::span<const std::uint32_t> items = collapsed.reference_of_item;
-    tree.blocks.resize((items.size() + kBlockSize - 1) / kBlockSize);
-    parallel.run([&] {
-        parallel.for_pieces(tree.blocks.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t b = begin; b < end; ++b) {
-                const std::size_t first = b * kBlockSize;
-                const auto count = std::min<std::size_t>(kBlockSize, items.size() - first);
-                fill_block(tree.blocks[b], items.subspan(first, count), mesh, hierarchy.references);
-            }
-        });
-    });
-    tree.stats.bytes = tree.byte_count();
-    return tree;
+    return lay_out(hierarchy, Items::kTriangles, mesh, options, parallel);
 }
 
 Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options, const Parallel& parallel) {
-    Tree tree;
-    // items are the references in their order
-    (void)make_nodes(hierarchy, options, 1, parallel, tree);
-    tree.stats.bytes = tree.byte_count();
-    return tree;
+    return lay_out(hierarchy, Items::kIds, {}, options, parallel);
 }
 
 void validate(const BuildOptions& options) {

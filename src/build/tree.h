@@ -12,8 +12,8 @@ namespace packet {
 
 /// Owns what a TreeView shows: a tree, or a grid.
 struct Tree {
-    AlignedVector<Node> nodes;
-    AlignedVector<WideNode> wide_nodes;
+    ScratchVector<Node> nodes;  ///< empty unless BuildOptions::keep_binary_nodes
+    ScratchVector<WideNode> wide_nodes;
     ScratchVector<TriangleBlock> blocks;
     Grid grid;  ///< empty but for grids
     Bounds3f bounds;
@@ -23,12 +23,12 @@ struct Tree {
     [[nodiscard]] std::size_t byte_count() const noexcept;
 };
 
-/// Lays the hierarchy out depth first, its triangles as blocks. Leaves that fit into one block do
-/// not straddle two. Fills node, leaf, depth, byte and cost statistics. O(n), blocks in parallel.
+/// Lays the hierarchy out as wide nodes, its triangles as blocks; and as binary nodes, depth first,
+/// if the options say so. Fills node, leaf, depth, byte and cost statistics. O(n), parallel.
 [[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,
                              const Parallel& parallel);
 
-/// Lays out only nodes, in both forms; items of the leaves are the hierarchy's references.
+/// Lays out only nodes; items of the leaves are the hierarchy's ids.
 [[nodiscard]] Tree make_tree(const Hierarchy& hierarchy, const BuildOptions& options,
                              const Parallel& parallel);
 

@@ -6,7 +6,7 @@
 
 namespace packet {
 
-Tree build_uniform_grid(MeshView mesh, const AlignedVector<Reference>& references,
+Tree build_uniform_grid(MeshView mesh, const ScratchVector<Reference>& references,
                         const BuildOptions& options, const Parallel& parallel) {
     Tree out;
     if (references.empty()) return out;

@@ -68,13 +68,15 @@ public:
           leaves_of_triangle_(mesh.triangles.size(), 0) {}
 
     void run() {
-        require(tree_.wide_nodes.empty() == tree_.nodes.empty(), "wide node", 0,
-                "only one of the two forms has nodes");
+        require(!tree_.wide_nodes.empty() || tree_.nodes.empty(), "wide node", 0,
+                "only the binary form has nodes");
         if (!tree_.grid.trees.empty()) {
             check_trees_of_cells();
-        } else if (!tree_.nodes.empty()) {
-            check_order();
-            for (std::uint32_t i = 0; i < tree_.nodes.size(); ++i) check_node(i);
+        } else if (!tree_.wide_nodes.empty()) {
+            if (has_binary_nodes()) {
+                check_order();
+                for (std::uint32_t i = 0; i < tree_.nodes.size(); ++i) check_node(i);
+            }
             check_wide_nodes();
         }
         check_cells();
@@ -83,6 +85,9 @@ public:
     }
 
 private:
+    /// Trees need not keep them.
+    [[nodiscard]] bool has_binary_nodes() const { return !tree_.nodes.empty(); }
+
     /// In depth-first order each node follows its parent or the last node below its sibling.
     void check_order() const {
         struct Pending {
@@ -177,6 +182,14 @@ private:
     void check_trees_of_cells() {
         const AlignedVector<GridTree>& trees = tree_.grid.trees;
         for (std::size_t i = 0; i < trees.size(); ++i) {
+            if (!has_binary_nodes()) {
+                const std::size_t end =
+                    i + 1 < trees.size() ? trees[i + 1].wide_node : tree_.wide_nodes.size();
+                for (std::uint32_t n = trees[i].wide_node; n < end; ++n) {
+                    hold_items_of_wide(n, trees[i].block * kBlockSize);
+                }
+                continue;
+            }
             const std::size_t end = i + 1 < trees.size() ? trees[i + 1].node : tree_.nodes.size();
             for (std::uint32_t n = trees[i].node; n < end; ++n) {
                 const Node& node = tree_.nodes[n];
@@ -184,6 +197,16 @@ private:
                 hold_items("node", n, box_of(node), trees[i].block * kBlockSize + node.link,
                            node.count);
             }
+        }
+    }
+
+    /// The items of a wide node's leaves.
+    void hold_items_of_wide(std::uint32_t index, std::uint32_t first_item) {
+        const WideNode& node = tree_.wide_nodes[index];
+        for (int child = 0; child < kWideSize; ++child) {
+            if (is_absent(node, child) || node.child[child].count == 0) continue;
+            hold_items("wide node", index, box_of(node, child), first_item + node.child[child].link,
+                       node.child[child].count);
         }
     }
 
@@ -222,6 +245,7 @@ private:
         for (std::uint32_t i = 0; i < tree_.wide_nodes.size(); ++i) {
             require(depth[i] >= 0, "wide node", i, "has no parent before it");
             require(depth[i] <= tree_.stats.depth, "wide node", i, "deeper than the binary form");
+            if (!has_binary_nodes()) hold_items_of_wide(i, 0);
             for (int child = 0; child < kWideSize; ++child) {
                 const WideNode& node = tree_.wide_nodes[i];
                 if (is_absent(node, child)) continue;
@@ -265,6 +289,7 @@ private:
             require(leaf != kNone && !is_item_seen_[item], "wide node", index,
                     "holds an item of no leaf, or of another wide leaf");
             is_item_seen_[item] = true;
+            if (!has_binary_nodes()) continue;
             const Node& held = tree_.nodes[leaf];
             require(held.link >= first && held.link + held.count <= first + count, "wide node",
                     index, "holds a leaf of the binary form in part");

@@ -1,20 +1,40 @@
+// Large arrays that are freed wait here for the next ones of about their size. To the system their
+// pages are free for the taking (MADV_FREE), but what it has not taken is not cleared again:
+// clearing is a third of the time in which a tree is built anew over fresh memory.
 #include "core/aligned_vector.h"
+
+#include <array>
+#include <mutex>
+#include <new>
+#include <utility>
 
 #if defined(__linux__)
 #include <sys/mman.h>
 #endif
 
+#if defined(__SANITIZE_ADDRESS__)
+#define PACKET_ADDRESS_SANITIZER
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define PACKET_ADDRESS_SANITIZER
+#endif
+#endif
+
 namespace packet {
 
-static constexpr std::size_t kCacheLine = 64;
-static constexpr std::size_t kHugePage = std::size_t{2} << 20;
+namespace {
+
+constexpr std::size_t kCacheLine = 64;
+constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
 /// Small arrays would waste most of a huge page.
-static bool is_large(std::size_t bytes) noexcept { return bytes >= 2 * kHugePage; }
+bool is_large(std::size_t bytes) noexcept { return bytes >= 2 * kHugePage; }
 
-void* allocate_aligned(std::size_t bytes) {
-    if (!is_large(bytes)) return ::operator new (bytes, std::align_val_t{kCacheLine});
-    bytes = (bytes + kHugePage - 1) / kHugePage * kHugePage;
+std::size_t in_huge_pages(std::size_t bytes) noexcept {
+    return (bytes + kHugePage - 1) / kHugePage * kHugePage;
+}
+
+void* allocate_large(std::size_t bytes) {
     void* const memory = ::operator new (bytes, std::align_val_t{kHugePage});
 #if defined(__linux__)
     // Where the system grants none, pages are small: nothing else changes.
@@ -23,8 +43,77 @@ void* allocate_aligned(std::size_t bytes) {
     return memory;
 }
 
+/// Tells the system that it may take the pages, whose contents nobody needs. False if it cannot be
+/// told; under the address sanitizer, which finds uses of freed memory, it is not.
+bool give_away([[maybe_unused]] void* memory, [[maybe_unused]] std::size_t bytes) noexcept {
+#if defined(MADV_FREE) && !defined(PACKET_ADDRESS_SANITIZER)
+    return madvise(memory, bytes, MADV_FREE) == 0;
+#else
+    return false;
+#endif
+}
+
+void free_large(void* memory) noexcept { ::operator delete (memory, std::align_val_t{kHugePage}); }
+
+/// Blocks that nobody uses. The oldest make room for others.
+class SpareBlocks {
+public:
+    /// A block of at least `bytes`, and at most an eighth more; or null.
+    [[nodiscard]] void* take(std::size_t bytes) noexcept {
+        const std::scoped_lock lock(mutex_);
+        Block* best = nullptr;
+        for (Block& block : blocks_) {
+            if (block.bytes < bytes || block.bytes > bytes + bytes / 8) continue;
+            if (best == nullptr || block.bytes < best->bytes) best = &block;
+        }
+        return best == nullptr ? nullptr : std::exchange(*best, Block{}).memory;
+    }
+
+    /// Takes over a block that would else be freed, and frees those there is no more room for.
+    void put(void* memory, std::size_t bytes) noexcept {
+        if (bytes > kMostBytes || !give_away(memory, bytes)) return free_large(memory);
+        const std::scoped_lock lock(mutex_);
+        Block moved{memory, bytes};
+        std::size_t sum = 0;
+        for (Block& block : blocks_) {
+            std::swap(moved, block);  // each moves on by one place, up to one that is empty
+            sum += block.bytes;
+            if (sum > kMostBytes) free_large(std::exchange(block, Block{}).memory);
+            if (moved.memory == nullptr) return;
+        }
+        free_large(moved.memory);
+    }
+
+private:
+    struct Block {
+        void* memory = nullptr;
+        std::size_t bytes = 0;
+    };
+    // What a build of some million triangles uses at once.
+    static constexpr std::size_t kMostBytes = std::size_t{512} << 20;
+
+    std::mutex mutex_;
+    std::array<Block, 16> blocks_;  ///< the newest first
+};
+
+/// Never destroyed: vectors of static lifetime may be freed after anything else.
+SpareBlocks& spare_blocks() {
+    static SpareBlocks& blocks = *new SpareBlocks;
+    return blocks;
+}
+
+}  // namespace
+
+void* allocate_aligned(std::size_t bytes) {
+    if (!is_large(bytes)) return ::operator new (bytes, std::align_val_t{kCacheLine});
+    bytes = in_huge_pages(bytes);
+    void* const spare = spare_blocks().take(bytes);
+    return spare != nullptr ? spare : allocate_large(bytes);
+}
+
 void deallocate_aligned(void* memory, std::size_t bytes) noexcept {
-    ::operator delete (memory, std::align_val_t{is_large(bytes) ? kHugePage : kCacheLine});
+    if (is_large(bytes)) return spare_blocks().put(memory, in_huge_pages(bytes));
+    ::operator delete (memory, std::align_val_t{kCacheLine});
 }
 
 }  // namespace packet

@@ -94,12 +94,12 @@ struct GridView {
 /// A tree, or a grid. Items of leaves are triangles (item i is lane i % 8 of block i / 8) or
 /// instances.
 struct TreeView {
-    const Node* nodes = nullptr;
+    const Node* nodes = nullptr;  ///< null if BuildOptions does not keep them
     const WideNode* wide_nodes = nullptr;
     const TriangleBlock* blocks = nullptr;
-    std::uint32_t node_count = 0;
-    GridView grid;               ///< if there is one, rays start in it; its cells may hold trees
-    float lower[3] = {0, 0, 0};  ///< the box of all items
+    std::uint32_t node_count = 0;  ///< of wide ones if there are no others
+    GridView grid;                 ///< if there is one, rays start in it; its cells may hold trees
+    float lower[3] = {0, 0, 0};    ///< the box of all items
     float upper[3] = {0, 0, 0};
     /// Boxes are taken as grown by slack * (max |corner of the tree's box - org| + reach) and an
     /// ulp of org. This covers all rounding on the way to a hit: no box that holds one is ever

@@ -67,7 +67,7 @@ struct TransformError {
 /// The tree over the instances that show anything. The meshes' trees are built.
 void build_top(std::span<const Instance> instances, const BuildOptions& options,
                const Parallel& parallel, SceneAccel& out) {
-    AlignedVector<Reference> references;
+    ScratchVector<Reference> references;
     std::vector<InstanceView> views(instances.size());
     TransformError error;
     for (std::size_t i = 0; i < instances.size(); ++i) {
@@ -89,7 +89,7 @@ void build_top(std::span<const Instance> instances, const BuildOptions& options,
     top_options.max_leaf_size = 1;
     const Hierarchy hierarchy = build_bvh_sah(std::move(references), top_options, parallel);
     out.top = make_tree(hierarchy, top_options, parallel);
-    for (const Reference& r : hierarchy.references) out.instances.push_back(views[r.id]);
+    for (const std::uint32_t id : hierarchy.ids) out.instances.push_back(views[id]);
     out.view.top = out.top.view();
     error.apply(out.view.top);
 }
@@ -125,7 +125,12 @@ std::shared_ptr<const SceneAccel> build_scene_accel(std::span<const TriangleMesh
                                                     std::span<const Instance> instances,
                                                     const BuildOptions& options) {
     return with_progress(options.progress, [&](Progress& progress) {
-        return build_all(meshes, instances, options, progress);
+        std::shared_ptr<const SceneAccel> out;
+        // One arena for all that is built: its threads stay awake.
+        Parallel(options.threads).run([&] {
+            out = build_all(meshes, instances, options, progress);
+        });
+        return out;
     });
 }
 

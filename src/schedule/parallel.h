@@ -28,13 +28,23 @@ public:
     Parallel(int requested, Progress& progress)
         : threads_(thread_count(requested)),
           progress_(progress.is_wanted() ? &progress : nullptr) {}
+    /// For a part of a job that is `share` of it, on so many threads: what it advances counts for
+    /// so much less.
+    [[nodiscard]] Parallel part(int threads, double share) const {
+        Parallel out = *this;
+        out.threads_ = threads;
+        out.scale_ *= share;
+        return out;
+    }
     [[nodiscard]] int threads() const noexcept { return threads_; }
+    /// Whether anybody wants to know of progress.
+    [[nodiscard]] bool is_watched() const noexcept { return progress_ != nullptr; }
 
     /// Runs fn() where the other members spread their work over this many threads.
     template <class Fn>
     void run(Fn&& fn) const {
-        if (threads_ == 1) {
-            fn();
+        if (threads_ == 1 || tbb::this_task_arena::max_concurrency() == threads_) {
+            fn();  // also within another run(): a new arena waits for its threads to wake up
         } else {
             tbb::task_arena(threads_).execute(fn);
         }
@@ -47,7 +57,7 @@ public:
     /// `part` of the job's phase is done; then as check().
     void advance(double part) const {
         if (progress_ == nullptr) return;
-        progress_->advance(part);
+        progress_->advance(scale_ * part);
         progress_->check();
     }
     /// fn(begin, end) for pieces of [0, count) of `grain` items each, the last one shorter, with a
@@ -82,6 +92,7 @@ public:
 private:
     int threads_;
     Progress* progress_ = nullptr;
+    double scale_ = 1.0;  ///< of what is advanced
 };
 
 }  // namespace packet
