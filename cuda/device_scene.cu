@@ -85,7 +85,7 @@ private:
         if (options_.stats != nullptr) side.rays->work.copy_to({&work, 1}, side.stream.get());
         side.stream.synchronize();
         if (options_.stats == nullptr) return;
-        *options_.stats += {count, work.nodes, work.triangles, work.nodes, work.lanes_issued};
+        *options_.stats += {count, work.nodes, work.triangles, work.nodes, work.lanes_issued, {}};
     }
 
     const DeviceScene::Impl& scene_;

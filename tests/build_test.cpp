@@ -196,6 +196,8 @@ std::vector<unsigned char> bytes_of(const Tree& tree) {
     append(tree.nodes);
     append(tree.wide_nodes);
     append(tree.blocks);
+    append(tree.treelets.begin);
+    append(tree.treelets.of_node);
     append(tree.grid.bricks);
     append(tree.grid.cells);
     append(tree.grid.trees);

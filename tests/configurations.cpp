@@ -36,6 +36,7 @@ std::vector<Build> all_builds() {
     for (const AccelName& accel : accel_names()) {
         BuildOptions options;
         options.accel = accel.kind;
+        options.treelet_bytes = 2000;  // so that small scenes have many
         if (accel.kind != AccelKind::kKdSah) {
             out.push_back({std::string(accel.name), options});
             continue;

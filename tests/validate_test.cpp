@@ -21,6 +21,7 @@ BuildOptions options_of(AccelKind kind) {
     BuildOptions options;
     options.accel = kind;
     options.max_leaf_size = 3;  // so that blocks have lanes without a triangle
+    options.treelet_bytes = 8000;
     return options;
 }
 
@@ -204,6 +205,32 @@ std::vector<Fault> faults_of_items(const Tree& sound, const Places& at) {
     return out;
 }
 
+std::vector<Fault> faults_of_treelets(const Tree& sound) {
+    const std::size_t longest = find(
+        sound.treelets.begin,
+        [&, i = 0u](std::uint32_t begin) mutable { return sound.treelets.begin[++i] - begin > 1; });
+    const std::uint32_t first = sound.treelets.begin[longest];
+    return {
+        {named("treelet", 0, "they are not all"), [](Tree& t) { ++t.treelets.begin.front(); }},
+        {named("treelet", 0, "they are not all"), [](Tree& t) { --t.treelets.begin.back(); }},
+        {named("treelet", 0, "they are not all"), [](Tree& t) { t.treelets.of_node.pop_back(); }},
+        {named("treelet", longest, "has no nodes"),
+         [=](Tree& t) { t.treelets.begin[longest + 1] = first; }},
+        {named("treelet", 0, "a node of it is noted as another's"),
+         [](Tree& t) { t.treelets.of_node[0] ^= 1; }},
+        {"treelet", [=](Tree& t) { t.treelets.of_node[first + 1] ^= 1; }},
+        {"treelet", [=](Tree& t) { --t.treelets.begin[longest + 1]; }},
+        {"treelet",
+         [=](Tree& t) {
+             --t.treelets.begin[longest + 1];
+             t.treelets.of_node[t.treelets.begin[longest + 1]] += 1;
+         }},
+        {named("treelet", 0, "other numbers"), [](Tree& t) { ++t.treelets.most_exits; }},
+        {named("treelet", 0, "the statistics"), [](Tree& t) { ++t.stats.treelets.count; }},
+        {named("treelet", 0, "the statistics"), [](Tree& t) { ++t.stats.treelets.cut_edges; }},
+    };
+}
+
 std::string complaint(const Tree& tree, MeshView mesh, AccelKind kind) {
     try {
         validate(tree, mesh, kind);
@@ -224,6 +251,7 @@ TEST_CASE("every structure over every kind of scene is as it should be") {
                     BuildOptions options;
                     options.accel = accel.kind;
                     options.max_leaf_size = leaf_size;
+                    options.treelet_bytes = 3000;
                     const Tree tree = build_tree(mesh.view(), options);
                     CHECK(complaint(tree, mesh.view(), accel.kind) == "");
                 }
@@ -241,7 +269,7 @@ TEST_CASE("whatever in a tree is spoilt is found and named") {
         const Places at(sound);
         int number = 0;
         for (const auto& faults : {faults_of_nodes(sound, at), faults_of_wide_nodes(sound, at),
-                                   faults_of_items(sound, at)}) {
+                                   faults_of_items(sound, at), faults_of_treelets(sound)}) {
             for (const Fault& fault : faults) {
                 ++number;
                 CAPTURE(number);

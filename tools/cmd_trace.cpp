@@ -182,6 +182,7 @@ void add_trace_command(CLI::App& program) {
     app.add_flag("--stats", command->stats, "Count nodes and triangles in a run of its own");
     app.add_flag("--json", command->json, "Print one JSON object");
     add_common_options(app, command->common);
+    add_treelet_options(app, command->common);
     add_device_option(app, command->device);
     app.callback([command] { run(*command); });
 }

@@ -12,6 +12,7 @@ cuda::DeviceMode device_mode(Mode mode) noexcept {
     switch (mode) {
         case Mode::kAuto: return cuda::DeviceMode::kAuto;
         case Mode::kSingle: return cuda::DeviceMode::kThread;
+        case Mode::kTreelet:
         case Mode::kStream: return cuda::DeviceMode::kSorted;
         case Mode::kPacket8:
         case Mode::kPacket16:

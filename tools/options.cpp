@@ -16,6 +16,9 @@
 namespace packet::tools {
 namespace {
 
+constexpr Named<TreeletCut> kTreeletCuts[] = {{TreeletCut::kAreas, "areas"},
+                                              {TreeletCut::kSubtrees, "subtrees"}};
+
 /// All of the text as a number, in the same way whatever the locale.
 template <class T>
 std::optional<T> parse_number(std::string_view text) {
@@ -119,6 +122,23 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
            "Threads to build and trace with, 0 for all")
         ->check(CLI::Range(0, 4096))
         ->default_str("0");
+}
+
+void add_treelet_options(CLI::App& app, CommonOptions& options) {
+    add_name_option(app, "--treelet-cut", "How trees are cut for treelet", list_names(kTreeletCuts),
+                    [&](std::string_view name) {
+                        options.build.treelet_cut =
+                            find_name("treelet cut", name, kTreeletCuts).value;
+                    })
+        ->default_str(std::string(kTreeletCuts[0].name));
+    app.add_option("--treelet-bytes", options.build.treelet_bytes,
+                   "Bytes of a treelet, at most; 0 for none")
+        ->capture_default_str();
+    app.add_option("--queue-bytes", options.trace.queue_bytes, "Bytes for rays that wait")
+        ->capture_default_str();
+    app.add_option("--queue-chunk", options.trace.queue_chunk, "Rays by which queues grow")
+        ->check(CLI::Range(1, 65536))
+        ->capture_default_str();
 }
 
 void add_device_option(CLI::App& app, Named<Device>& device) {

@@ -32,6 +32,7 @@ CLI::Option* add_name_option(CLI::App& app, const std::string& flags, const std:
 
 // What these add writes into the second argument, which must outlive the parse.
 void add_common_options(CLI::App& app, CommonOptions& options);
+void add_treelet_options(CLI::App& app, CommonOptions& options);
 void add_camera_options(CLI::App& app, CameraOptions& options);
 void add_device_option(CLI::App& app, Named<Device>& device);
 

@@ -38,6 +38,12 @@ enum class KdBuild : std::uint8_t {
     kBreadthFirst  ///< level by level; while cells are large, from some of these places
 };
 
+/// How trees are cut into treelets, the parts that `Mode::kTreelet` queues rays at.
+enum class TreeletCut : std::uint8_t {
+    kAreas,    ///< so that rays are expected to enter least of them
+    kSubtrees  ///< subtrees as large as allowed, then what is above them in the same way
+};
+
 struct BuildOptions {
     AccelKind accel = AccelKind::kBvh;
     /// Which builder serves `kBvh`. Every other structure names its own: with one of them, anything
@@ -74,6 +80,11 @@ struct BuildOptions {
     int morton_bits = 0;
     /// Keep trees in their binary form, too, as CUDA devices walk them. 32 bytes a node.
     bool keep_binary_nodes = true;
+    /// Bytes of a treelet, at most, with its triangles (but one node is not cut); 0 cuts none, and
+    /// then `Mode::kTreelet` is as `Mode::kStream`. Larger ones have more rays to share what is
+    /// fetched, smaller ones stay in a nearer cache: docs/benchmarking.md#treelets.
+    std::size_t treelet_bytes = std::size_t{4} << 20;
+    TreeletCut treelet_cut = TreeletCut::kAreas;
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
     /// the same for any number.
     int threads = 0;
@@ -85,6 +96,15 @@ struct BuildOptions {
     std::function<bool(float fraction)> progress;
 };
 
+/// The treelets of a tree; of a scene the sums, and the greatest of the last two.
+struct TreeletStats {
+    std::size_t count = 0;
+    std::size_t bytes = 0;      ///< of nodes and triangles; what two treelets share counts twice
+    std::size_t cut_edges = 0;  ///< links that lead from one to another
+    std::size_t most_bytes = 0;
+    double expected_entries = 0.0;  ///< by a random ray that meets the root's box
+};
+
 struct BuildStats {
     double seconds = 0.0;
     std::size_t bytes = 0;  ///< memory of nodes and triangle blocks
@@ -93,6 +113,7 @@ struct BuildStats {
     int depth = 0;          ///< edges from the root to the deepest leaf
     double sah_cost = 0.0;  ///< expected cost of a random ray that meets the root's box
     SkippedTriangles skipped;
+    TreeletStats treelets;
 };
 
 /// The structure that the options come to: `accel`, or the one that serves `kBvh` by `quality`.

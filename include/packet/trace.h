@@ -22,7 +22,10 @@ enum class Mode : std::uint8_t {
     kPacket8,   ///< 8 rays share one stack
     kPacket16,  ///< 16 rays share one stack
     kTile,      ///< up to 128 rays share one stack and a beam around them, as far as they cohere
-    kStream     ///< incoherent rays by the thousand: sorted, then up to 64 share one stack
+    kStream,    ///< incoherent rays by the thousand: sorted, then up to 64 share one stack
+    kTreelet    ///< incoherent rays by the million in scenes far larger than the cache: each waits
+                ///< at the part of the tree it enters next until there are many. Where the scene is
+                ///< not one tree, or not cut into treelets, as kStream
 };
 
 struct ModeName {
@@ -34,6 +37,20 @@ struct ModeName {
 /// Throws Error{kUnknownName} that lists the valid names.
 [[nodiscard]] Mode parse_mode(std::string_view name);
 
+/// What `Mode::kTreelet` does besides: how rays and treelets come together.
+struct TreeletTraceStats {
+    std::uint64_t loads = 0;          ///< times that a treelet was gone through by its queued rays
+    std::uint64_t entries = 0;        ///< rays that entered treelets, each as often as it did
+    std::uint64_t streams = 0;        ///< of up to 64 rays, that did so
+    std::uint64_t treelet_bytes = 0;  ///< of all loads, if each reads all of its treelet
+    std::uint64_t queue_bytes = 0;    ///< written and read for rays that waited
+    std::uint64_t peak_queued = 0;    ///< most rays that waited at a time, by the thread with most
+
+    TreeletTraceStats& operator+=(const TreeletTraceStats& other) noexcept;
+    [[nodiscard]] double rays_per_load() const noexcept;
+    [[nodiscard]] double stream_utilization() const noexcept;  ///< rays of 64 in a stream
+};
+
 /// Work counted while tracing.
 struct TraceStats {
     std::uint64_t rays = 0;
@@ -41,6 +58,7 @@ struct TraceStats {
     std::uint64_t triangles = 0;     ///< triangles met, summed over lanes
     std::uint64_t lanes_active = 0;  ///< lanes that took part in visits of nodes
     std::uint64_t lanes_issued = 0;  ///< lanes that were paid for in them
+    TreeletTraceStats treelets;
 
     TraceStats& operator+=(const TraceStats& other) noexcept;
     [[nodiscard]] double nodes_per_ray() const noexcept;
@@ -57,6 +75,15 @@ struct TraceOptions {
     int width = 0;
     /// Kernels to use; without a value default_isa().
     std::optional<IsaId> isa;
+    /// For `kTreelet`: bytes for rays that wait, and what each enters later, divided among threads;
+    /// 16 a ray and 16 a treelet that it enters later. Where they do not suffice, rays go on
+    /// without waiting. Some 50 bytes a treelet, and 1 MB, come on top for each thread.
+    std::size_t queue_bytes = std::size_t{256} << 20;
+    /// For `kTreelet`: queues grow by so many rays at a time, 1 to 65536. Fewer waste less memory.
+    int queue_chunk = 256;
+    /// Told what fraction of the rays is traced, as BuildOptions::progress is: false ends the call
+    /// with Error{kCancelled}; the results are then those of some of the rays.
+    std::function<bool(float fraction)> progress;
     /// If set, work is counted into it (added to what it holds). Counting costs time.
     TraceStats* stats = nullptr;
 };

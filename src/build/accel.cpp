@@ -7,6 +7,7 @@
 #include "build/kd_tree.h"
 #include "build/octree.h"
 #include "build/tree.h"
+#include "build/treelets.h"
 #include "build/uniform_grid.h"
 #include "build/validate_tree.h"
 #include "core/macros.h"
@@ -116,7 +117,7 @@ static Tree build(AccelKind kind, MeshView mesh, ScratchVector<Reference> refere
 }
 
 Tree build_tree(MeshView mesh, const BuildOptions& options) {
-    return with_progress(options.progress, [&](Progress& progress) {
+    return with_progress(options.progress, "the build", [&](Progress& progress) {
         return build_tree(mesh, options, progress, 1.0);
     });
 }
@@ -140,6 +141,7 @@ Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress, 
         return make_tree(hierarchy, mesh, options, parallel);
     };
     Tree tree = build(kind, mesh, std::move(references.items), options, parallel, finish);
+    cut_into_treelets(tree, options, parallel);
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();

@@ -83,6 +83,12 @@ TreeView Tree::view() const noexcept {
     out.nodes = nodes.empty() ? nullptr : nodes.data();
     out.wide_nodes = wide_nodes.data();
     out.blocks = blocks.data();
+    if (!treelets.begin.empty()) {
+        out.treelet_begin = treelets.begin.data();
+        out.treelet_of_node = treelets.of_node.data();
+        out.most_treelet_exits = treelets.most_exits;
+        out.treelet_count = static_cast<std::uint32_t>(treelets.begin.size() - 1);
+    }
     out.grid = grid.view();
     out.node_count = static_cast<std::uint32_t>(nodes.empty() ? wide_nodes.size() : nodes.size());
     for (int a = 0; a < 3 && !out.is_empty(); ++a) {
@@ -94,7 +100,8 @@ TreeView Tree::view() const noexcept {
 
 std::size_t Tree::byte_count() const noexcept {
     return nodes.size() * sizeof(Node) + wide_nodes.size() * sizeof(WideNode) +
-           blocks.size() * sizeof(TriangleBlock) + grid.byte_count();
+           blocks.size() * sizeof(TriangleBlock) + grid.byte_count() +
+           (treelets.begin.size() + treelets.of_node.size()) * sizeof(std::uint32_t);
 }
 
 Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,

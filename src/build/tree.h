@@ -8,12 +8,22 @@
 
 #include <packet/accel.h>
 
+#include <vector>
+
 namespace packet {
+
+/// How a tree's wide nodes are cut into treelets (treelets.h).
+struct Treelets {
+    std::vector<std::uint32_t> begin;    ///< treelet t is nodes begin[t] to begin[t + 1]
+    std::vector<std::uint32_t> of_node;  ///< treelets by node
+    std::uint32_t most_exits = 0;        ///< links that leave a treelet
+};
 
 /// Owns what a TreeView shows: a tree, or a grid.
 struct Tree {
     ScratchVector<Node> nodes;  ///< empty unless BuildOptions::keep_binary_nodes
     ScratchVector<WideNode> wide_nodes;
+    Treelets treelets;  ///< empty if the tree is not cut
     ScratchVector<TriangleBlock> blocks;
     Grid grid;  ///< empty but for grids
     Bounds3f bounds;

@@ -79,6 +79,7 @@ public:
             }
             check_wide_nodes();
         }
+        if (!tree_.treelets.begin.empty()) check_treelets();
         check_cells();
         for (std::size_t i = 0; i < leaf_of_item_.size(); ++i) check_item(i);
         for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) check_triangle(i);
@@ -268,6 +269,37 @@ private:
             require(is_item_seen_[i] == (leaf_of_item_[i] != kNone), "item", i,
                     "is in a leaf of the binary form and in none of the 8-wide one");
         }
+    }
+
+    /// Runs of nodes that together are all, in which links that leave one lead to first nodes.
+    void check_treelets() const {
+        const std::vector<std::uint32_t>&begin = tree_.treelets.begin, &of = tree_.treelets.of_node;
+        const std::size_t count = begin.size() - 1;
+        require(begin.front() == 0 && begin.back() == tree_.wide_nodes.size() &&
+                    of.size() == tree_.wide_nodes.size(),
+                "treelet", 0, "they are not all nodes");
+        std::size_t cut_edges = 0;
+        std::uint32_t most_exits = 0;
+        for (std::uint32_t t = 0; t < count; ++t) {
+            require(begin[t] < begin[t + 1], "treelet", t, "has no nodes");
+            std::uint32_t exits = 0;
+            for (std::uint32_t i = begin[t]; i < begin[t + 1]; ++i) {
+                require(of[i] == t, "treelet", t, "a node of it is noted as another's");
+                for (const WideChild& child : tree_.wide_nodes[i].child) {
+                    if (child.is_leaf() || child.link - begin[t] < begin[t + 1] - begin[t])
+                        continue;
+                    require(begin[of[child.link]] == child.link, "treelet", t,
+                            "a link leads into the middle of another");
+                    ++exits;
+                }
+            }
+            cut_edges += exits;
+            most_exits = std::max(most_exits, exits);
+        }
+        require(most_exits == tree_.treelets.most_exits, "treelet", 0,
+                "other numbers of links leave them than noted");
+        require(tree_.stats.treelets.count == count && tree_.stats.treelets.cut_edges == cut_edges,
+                "treelet", 0, "the statistics' counts are others");
     }
 
     /// Children that are not there have boxes that nothing meets, and are a leaf of the first item.

@@ -56,6 +56,18 @@ struct alignas(32) TriangleBlock {
 };
 static_assert(sizeof(TriangleBlock) == 320 && std::is_trivially_copyable_v<TriangleBlock>);
 
+/// Bytes that rays read of a node: its own and those of its leaves' blocks.
+[[nodiscard]] constexpr std::uint32_t bytes_with_blocks(const WideNode& node) noexcept {
+    std::uint32_t blocks = 0;
+    for (int c = 0; c < kWideSize; ++c) {
+        const WideChild& child = node.child[c];
+        const bool is_there = node.plane[0][0][c] <= node.plane[1][0][c];
+        if (!child.is_leaf() || !is_there) continue;
+        blocks += (child.link + child.count - 1) / kBlockSize - child.link / kBlockSize + 1;
+    }
+    return static_cast<std::uint32_t>(sizeof(WideNode) + blocks * sizeof(TriangleBlock));
+}
+
 /// Cells along each side of a brick: a brick's 64 cells have a bit each in one word.
 inline constexpr int kBrickSide = 4;
 
@@ -98,8 +110,14 @@ struct TreeView {
     const WideNode* wide_nodes = nullptr;
     const TriangleBlock* blocks = nullptr;
     std::uint32_t node_count = 0;  ///< of wide ones if there are no others
-    GridView grid;                 ///< if there is one, rays start in it; its cells may hold trees
-    float lower[3] = {0, 0, 0};    ///< the box of all items
+    /// Treelet t is wide nodes treelet_begin[t] to treelet_begin[t + 1], the first one its root;
+    /// links that leave it lead to roots. No treelets: the tree is not cut.
+    std::uint32_t treelet_count = 0;
+    std::uint32_t most_treelet_exits = 0;  ///< links that leave one
+    const std::uint32_t* treelet_begin = nullptr;
+    const std::uint32_t* treelet_of_node = nullptr;
+    GridView grid;               ///< if there is one, rays start in it; its cells may hold trees
+    float lower[3] = {0, 0, 0};  ///< the box of all items
     float upper[3] = {0, 0, 0};
     /// Boxes are taken as grown by slack * (max |corner of the tree's box - org| + reach) and an
     /// ulp of org. This covers all rounding on the way to a hit: no box that holds one is ever

@@ -13,6 +13,7 @@ struct NoCounters {
     PACKET_INLINE explicit NoCounters(TraceStats*) {}
     PACKET_INLINE void visit(int, int) {}
     PACKET_INLINE void triangles(int) {}
+    PACKET_INLINE void treelet_stream(int) {}
 };
 
 class Counters {
@@ -26,6 +27,11 @@ public:
     }
     PACKET_INLINE void triangles(int tests) {
         stats_.triangles += static_cast<std::uint64_t>(tests);
+    }
+    /// A stream of `rays` enters a treelet.
+    PACKET_INLINE void treelet_stream(int rays) {
+        stats_.treelets.entries += static_cast<std::uint64_t>(rays);
+        ++stats_.treelets.streams;
     }
 
 private:

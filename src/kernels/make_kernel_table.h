@@ -4,6 +4,7 @@
 #include "kernels/kernel_table.h"
 #include "kernels/stream_batch.h"
 #include "kernels/trace_batch.h"
+#include "kernels/treelet_run.h"
 #include "kernels/triangle_box_axes.h"
 #include "kernels/triangle_box_clip.h"
 
@@ -30,6 +31,10 @@ constexpr KernelTable make_kernel_table() {
     fill.template operator()<Query::kClosest, Counters>(table.closest, KT::kCounting);
     fill.template operator()<Query::kAny, NoCounters>(table.any, KT::kNotCounting);
     fill.template operator()<Query::kAny, Counters>(table.any, KT::kCounting);
+    table.closest_treelet[KT::kNotCounting] = run_treelet<Query::kClosest, Isa, NoCounters>;
+    table.closest_treelet[KT::kCounting] = run_treelet<Query::kClosest, Isa, Counters>;
+    table.any_treelet[KT::kNotCounting] = run_treelet<Query::kAny, Isa, NoCounters>;
+    table.any_treelet[KT::kCounting] = run_treelet<Query::kAny, Isa, Counters>;
     table.closest8 = closest_packet<8, Isa>;
     table.closest16 = closest_packet<16, Isa>;
     table.any8 = any_packet<8, Isa>;

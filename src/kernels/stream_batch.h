@@ -8,6 +8,15 @@
 
 namespace packet {
 
+/// How many rays from the first on are of its class.
+PACKET_INLINE int class_run(const float* const* dir, int most) {
+    const auto class_of = [&](int i) { return direction_class(dir[0][i], dir[1][i], dir[2][i]); };
+    const int first_class = class_of(0);
+    int count = 1;
+    while (count < most && class_of(count) == first_class) ++count;
+    return count;
+}
+
 template <Query query, class Isa, class Stats>
 class StreamBatch {
 public:
@@ -24,7 +33,7 @@ public:
             const std::size_t left = batch_.count - begin;
             const int most = left < kStreamRays ? static_cast<int>(left) : kStreamRays;
             const RayColumns columns = gather_rays(batch_, begin, most, gathered_);
-            const int count = run_length(columns.component + 4, most);
+            const int count = class_run(columns.component + 4, most);
             prefetch_rays(batch_, begin + static_cast<std::size_t>(count), kStreamRays);
             trace_stream(columns, begin, count);
             begin += static_cast<std::size_t>(count);
@@ -32,16 +41,6 @@ public:
     }
 
 private:
-    /// The rays from the first on that are of its class.
-    PACKET_INLINE static int run_length(const float* const* dir, int most) {
-        const auto class_of = [&](int i) {
-            return direction_class(dir[0][i], dir[1][i], dir[2][i]);
-        };
-        const int first_class = class_of(0);
-        int count = 1;
-        while (count < most && class_of(count) == first_class) ++count;
-        return count;
-    }
     PACKET_INLINE void trace_stream(const RayColumns& columns, std::size_t begin, int count) {
         rays_.active = 0;
         for (int first = 0; first < count; first += kSingleLanes) {

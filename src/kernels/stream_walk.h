@@ -96,7 +96,14 @@ private:
     }
 };
 
-template <Query query, class Isa, class Stats>
+/// Where streams that walk all of a tree may go. Other parts keep what `rays` would enter beyond
+/// them: a node, and `enter` before which none does.
+struct WholeTree {
+    static constexpr bool holds(std::uint32_t) { return true; }
+    static constexpr void leave(std::uint32_t, RaySet, float) {}
+};
+
+template <Query query, class Isa, class Stats, class Part = WholeTree>
 class StreamWalk {
 public:
     PACKET_INLINE StreamWalk(const TreeView& tree, std::int32_t instance_id, Stats& stats)
@@ -104,15 +111,27 @@ public:
 
     /// Walks the tree with all active rays.
     PACKET_INLINE void run(StreamRays<Isa>& rays) {
-        looking_ = rays.active;
-        if (looking_ == 0) return;
-        visit(rays, tree_.wide_nodes[0], looking_);
+        Part all;
+        look_with(rays.active);
+        walk(rays, 0, rays.active, all);
+    }
+    PACKET_INLINE void look_with(RaySet rays) { looking_ = rays; }
+    PACKET_INLINE RaySet looking() const { return looking_; }
+
+    /// Walks what is below a node in the part, with those of `entering` that are looking.
+    PACKET_INLINE void walk(StreamRays<Isa>& rays, std::uint32_t root, RaySet entering,
+                            Part& part) {
+        entering &= looking_;
+        if (entering == 0) return;
+        visit(rays, tree_.wide_nodes[root], entering);
         while (size_ != 0) {
             const Entry& top = stack_[--size_];
             const RaySet active = top.rays & looking_;
             if (active == 0) continue;
             if (top.child.is_leaf()) {
                 meet_leaf(rays, {top.child.link, top.child.count}, active, top.enter);
+            } else if (!part.holds(top.child.link)) {
+                part.leave(top.child.link, active, top.enter);
             } else {
                 visit(rays, tree_.wide_nodes[top.child.link], active);
             }

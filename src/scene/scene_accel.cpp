@@ -22,6 +22,12 @@ void add_stats(BuildStats& sum, const BuildStats& tree) {
     sum.skipped.non_finite += tree.skipped.non_finite;
     sum.skipped.too_large += tree.skipped.too_large;
     sum.skipped.zero_area += tree.skipped.zero_area;
+    sum.treelets.count += tree.treelets.count;
+    sum.treelets.bytes += tree.treelets.bytes;
+    sum.treelets.cut_edges += tree.treelets.cut_edges;
+    sum.treelets.most_bytes = std::max(sum.treelets.most_bytes, tree.treelets.most_bytes);
+    sum.treelets.expected_entries =
+        std::max(sum.treelets.expected_entries, tree.treelets.expected_entries);
 }
 
 /// `share_of_one`: how much of the work a triangle is.
@@ -124,7 +130,7 @@ static std::shared_ptr<const SceneAccel> build_all(std::span<const TriangleMesh>
 std::shared_ptr<const SceneAccel> build_scene_accel(std::span<const TriangleMesh> meshes,
                                                     std::span<const Instance> instances,
                                                     const BuildOptions& options) {
-    return with_progress(options.progress, [&](Progress& progress) {
+    return with_progress(options.progress, "the build", [&](Progress& progress) {
         std::shared_ptr<const SceneAccel> out;
         // One arena for all that is built: its threads stay awake.
         Parallel(options.threads).run([&] {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <string>
 
 namespace packet {
 
@@ -45,7 +46,8 @@ void Progress::report(float fraction) {
 /// is_telling_ is set.
 void Progress::tell(float fraction) {
     try {
-        if (!report_(fraction)) throw Error(ErrorCode::kCancelled, "the build was cancelled");
+        if (!report_(fraction))
+            throw Error(ErrorCode::kCancelled, std::string(job_) + " was cancelled");
     } catch (...) {
         failure_ = std::current_exception();
         is_stopped_ = true;

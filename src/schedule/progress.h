@@ -17,7 +17,8 @@ public:
     /// with fractions that never decrease; what it throws ends the job.
     using Report = std::function<bool(float)>;
 
-    explicit Progress(const Report& report) : report_(report) {}
+    /// `job` is what an error says was cancelled.
+    Progress(const Report& report, const char* job) : report_(report), job_(job) {}
     [[nodiscard]] bool is_wanted() const noexcept { return report_ != nullptr; }
 
     /// From here on parts are those of a phase, which is `share` of the job. For the thread that
@@ -38,6 +39,7 @@ private:
     void tell(float fraction);
 
     const Report& report_;
+    const char* job_;
     double base_ = 0.0, share_ = 0.0;  ///< done before this phase, and in it
     std::atomic<double> part_{0.0};
     std::atomic<std::int64_t> next_time_{0};  ///< of the steady clock
@@ -51,8 +53,8 @@ private:
 /// Runs fn(progress) and returns its result. If the report says no, throws Error{kCancelled}; if it
 /// throws, that.
 template <class Fn>
-auto with_progress(const Progress::Report& report, Fn fn) {
-    Progress progress(report);
+auto with_progress(const Progress::Report& report, const char* job, Fn fn) {
+    Progress progress(report, job);
     try {
         progress.report(0.0f);
         auto result = fn(progress);

@@ -6,12 +6,14 @@
 #include "schedule/parallel.h"
 #include "schedule/pixel_order.h"
 #include "schedule/stream_order.h"
+#include "schedule/treelet_scheduler.h"
 
 #include <packet/error.h>
 #include <packet/trace.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <mutex>
@@ -25,6 +27,7 @@ constexpr std::array kModeNames = {
     ModeName{Mode::kAuto, "auto"},       ModeName{Mode::kSingle, "single"},
     ModeName{Mode::kPacket8, "packet8"}, ModeName{Mode::kPacket16, "packet16"},
     ModeName{Mode::kTile, "tile"},       ModeName{Mode::kStream, "stream"},
+    ModeName{Mode::kTreelet, "treelet"},
 };
 
 // Rays in a task: some 100 us of work, so that tasks are cheap and cores end together.
@@ -44,6 +47,7 @@ KernelTable::Kernel kernel_of(Mode mode) {
         case Mode::kPacket16: return KernelTable::kPacket16;
         case Mode::kTile: return KernelTable::kTile;
         case Mode::kStream: return KernelTable::kStream;
+        case Mode::kTreelet:  // has kernels of its own
         case Mode::kAuto:
         case Mode::kSingle: break;
     }
@@ -111,17 +115,26 @@ bool has_one_tree(const SceneView& scene) {
     return scene.is_single_mesh && scene.instances[0].tree->is_tree();
 }
 
+bool has_treelets(const SceneView& scene) {
+    return has_one_tree(scene) && scene.instances[0].tree->treelet_count != 0;
+}
+
 enum class Query { kClosest, kAny };
 
 /// What the rays are traced by.
 struct Plan {
     KernelTable::Kernel kernel;
-    bool is_sorted;         ///< whether the rays are sorted first
-    bool is_trial = false;  ///< whether packets are tried, too
+    bool is_sorted = false;  ///< whether the rays are sorted first
+    bool is_trial = false;   ///< whether packets are tried, too
+    bool by_treelets = false;
 };
 
 Plan plan_as_asked(const SceneView& scene, Mode mode) {
-    if (mode == Mode::kStream && !has_one_tree(scene)) return {KernelTable::kSingle, false};
+    if (mode == Mode::kTreelet) {
+        if (has_treelets(scene)) return {.kernel = KernelTable::kStream, .by_treelets = true};
+        mode = Mode::kStream;
+    }
+    if (mode == Mode::kStream && !has_one_tree(scene)) return {.kernel = KernelTable::kSingle};
     return {kernel_of(mode), mode == Mode::kStream};
 }
 
@@ -143,10 +156,11 @@ public:
     using Kernels = KernelTable::Batch[KernelTable::kKernelCount][KernelTable::kCountingCount];
 
     SpanTrace(const Scene& scene, std::span<const Ray> rays, Query query,
-              const TraceOptions& options)
+              const TraceOptions& options, Progress& progress)
         : scene_(scene.accel()),
           options_(options),
-          parallel_(options.threads),
+          rays_(rays),
+          parallel_(options.threads, progress),
           plan_(options.mode == Mode::kAuto ? plan_by_looks(scene_, rays, query)
                                             : plan_as_asked(scene_.view, options.mode)),
           tasks_(plan_.is_sorted ? Tasks::sorted(rays, parallel_.threads())
@@ -155,6 +169,40 @@ public:
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
                                                   "; it must be 0 (no image) or more");
+        }
+        constexpr int kMostChunk = 65536;
+        if (options.queue_chunk < 1 || options.queue_chunk > kMostChunk) {
+            throw Error(ErrorCode::kBadValue,
+                        "queue_chunk is " + std::to_string(options.queue_chunk) +
+                            "; it must be 1 to " + std::to_string(kMostChunk));
+        }
+    }
+
+    [[nodiscard]] bool goes_by_treelets() const { return plan_.by_treelets; }
+
+    /// Each thread has its own queues and takes rays as long as there are any.
+    void run_by_treelets(KernelTable::Treelet kernel, Hit* hits, std::uint8_t* occluded) const {
+        constexpr std::size_t kMostRays = 0xFFFFFFFF - StreamOrder::kMostRays;
+        const auto threads = static_cast<std::size_t>(parallel_.threads());
+        for (std::size_t first = 0; first < rays_.size(); first += kMostRays) {
+            const std::size_t count = std::min(kMostRays, rays_.size() - first);
+            const TraceBatch batch{&scene_.view,
+                                   rays_.data() + first,
+                                   nullptr,
+                                   count,
+                                   hits == nullptr ? nullptr : hits + first,
+                                   occluded == nullptr ? nullptr : occluded + first,
+                                   options_.stats};
+            const TreeletJob job{batch,
+                                 kernel,
+                                 options_.queue_bytes / threads,
+                                 static_cast<std::uint32_t>(options_.queue_chunk),
+                                 rays_per_stream_task(count, parallel_.threads())};
+            std::atomic<std::size_t> next{0};
+            parallel_.run([&] {
+                parallel_.for_pieces(threads, 1,
+                                     [&](std::size_t, std::size_t) { run_thread(job, next); });
+            });
         }
     }
 
@@ -167,11 +215,34 @@ public:
             const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : plan_.kernel;
             parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
                 if (!is_trial(task)) run_task(task, kernel(best), batch);
+                parallel_.advance(1.0 / static_cast<double>(tasks_.count()));
             });
         });
     }
 
 private:
+    void run_thread(const TreeletJob& job, std::atomic<std::size_t>& next) const {
+        const std::size_t all = job.batch.count;
+        const double part_of_one = 1.0 / static_cast<double>(rays_.size());
+        TreeletScheduler scheduler(job);
+        for (;;) {
+            parallel_.check();
+            if (!scheduler.has_room() && scheduler.run()) continue;
+            const std::size_t begin = next.fetch_add(job.rays_per_start);
+            if (begin >= all) break;
+            const std::size_t count = std::min(job.rays_per_start, all - begin);
+            scheduler.start(begin, count);
+            parallel_.advance(part_of_one * static_cast<double>(count));
+        }
+        while (scheduler.run()) parallel_.check();
+        add_stats(scheduler.stats());
+    }
+    void add_stats(const TraceStats& stats) const {
+        if (options_.stats == nullptr) return;
+        const std::lock_guard lock(stats_mutex_);
+        *options_.stats += stats;
+    }
+
     /// Pairs of neighbouring tasks, spread over all: each contender gets one of a pair.
     [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrialPairs; }
     [[nodiscard]] bool is_trial(std::size_t task) const {
@@ -210,18 +281,31 @@ private:
         TraceStats stats;
         batch.stats = &stats;
         tasks_.run(task, kernel, batch);
-        const std::lock_guard lock(stats_mutex_);
-        *options_.stats += stats;
+        add_stats(stats);
     }
 
     const SceneAccel& scene_;
     const TraceOptions& options_;
+    std::span<const Ray> rays_;
     Parallel parallel_;
     Plan plan_;
     Tasks tasks_;
     bool tries_;  ///< whether to find the kernel by trying
     mutable std::mutex stats_mutex_;
 };
+
+/// Calls run(trace, counting), and tells of its progress.
+template <class Run>
+void trace_span(const Scene& scene, std::span<const Ray> rays, Query query,
+                const TraceOptions& options, Run run) {
+    const auto counting =
+        options.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
+    with_progress(options.progress, "tracing", [&](Progress& progress) {
+        progress.start_phase(1.0);
+        run(SpanTrace(scene, rays, query, options, progress), counting);
+        return 0;
+    });
+}
 
 void check_sizes(std::size_t rays, std::size_t results, const char* name) {
     if (rays == results) return;
@@ -252,7 +336,22 @@ TraceStats& TraceStats::operator+=(const TraceStats& other) noexcept {
     triangles += other.triangles;
     lanes_active += other.lanes_active;
     lanes_issued += other.lanes_issued;
+    treelets += other.treelets;
     return *this;
+}
+TreeletTraceStats& TreeletTraceStats::operator+=(const TreeletTraceStats& other) noexcept {
+    loads += other.loads;
+    entries += other.entries;
+    streams += other.streams;
+    treelet_bytes += other.treelet_bytes;
+    queue_bytes += other.queue_bytes;
+    peak_queued = std::max(peak_queued, other.peak_queued);
+    return *this;
+}
+double TreeletTraceStats::rays_per_load() const noexcept { return ratio(entries, loads); }
+double TreeletTraceStats::stream_utilization() const noexcept {
+    constexpr std::uint64_t kMostRays = 64;
+    return ratio(entries, kMostRays * streams);
 }
 double TraceStats::nodes_per_ray() const noexcept { return ratio(nodes, rays); }
 double TraceStats::triangles_per_ray() const noexcept { return ratio(triangles, rays); }
@@ -261,15 +360,27 @@ double TraceStats::lane_utilization() const noexcept { return ratio(lanes_active
 void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                    const TraceOptions& options) {
     check_sizes(rays.size(), hits.size(), "hits");
-    const SpanTrace trace(scene, rays, Query::kClosest, options);
-    trace.run(select_kernels(options.isa).closest, hits.data(), nullptr);
+    const KernelTable& kernels = select_kernels(options.isa);
+    trace_span(scene, rays, Query::kClosest, options, [&](const SpanTrace& trace, auto counting) {
+        if (trace.goes_by_treelets()) {
+            trace.run_by_treelets(kernels.closest_treelet[counting], hits.data(), nullptr);
+        } else {
+            trace.run(kernels.closest, hits.data(), nullptr);
+        }
+    });
 }
 
 void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size(), "results");
-    const SpanTrace trace(scene, rays, Query::kAny, options);
-    trace.run(select_kernels(options.isa).any, nullptr, occluded.data());
+    const KernelTable& kernels = select_kernels(options.isa);
+    trace_span(scene, rays, Query::kAny, options, [&](const SpanTrace& trace, auto counting) {
+        if (trace.goes_by_treelets()) {
+            trace.run_by_treelets(kernels.any_treelet[counting], nullptr, occluded.data());
+        } else {
+            trace.run(kernels.any, nullptr, occluded.data());
+        }
+    });
 }
 
 Hit trace_closest(const Scene& scene, const Ray& ray) {
