@@ -5,9 +5,11 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <thread>
+#include <utility>
 
 using namespace packet;
 using namespace packet::test;
@@ -231,6 +233,50 @@ TEST_CASE("statistics count work, and counting changes no hit") {
         CHECK(stats.lane_utilization() > 0.0);
         CHECK(stats.lane_utilization() <= 1.0);
         if (mode.mode == Mode::kSingle) CHECK(stats.lane_utilization() == 1.0);
+    }
+}
+
+TEST_CASE("shadow rays go by tiles where these are full, by streams elsewhere, with one answer") {
+    // 128 x 128 rays from a plane through the terrain to one light above it
+    const auto rays_over = [](const Bounds3f& box) {
+        constexpr int kSide = 128;
+        const glm::vec3 light = box.lower + glm::vec3(0.4f, 3.0f, 0.3f) * box.extent();
+        std::vector<Ray> rays;
+        for (int i = 0; i < kSide * kSide; ++i) {
+            const glm::vec3 place(static_cast<float>(i % kSide) / kSide, 0.5f,
+                                  static_cast<float>(i / kSide) / kSide);
+            rays.push_back(aim(box.lower + place * box.extent(), light));
+            rays.back().tfar = 1.0f;
+        }
+        return rays;
+    };
+    const auto trace = [](const Scene& scene, std::span<const Ray> rays, Mode mode, IsaId isa) {
+        std::vector<std::uint8_t> occluded(rays.size());
+        TraceStats stats;
+        TraceOptions options;
+        options.mode = mode, options.isa = isa, options.threads = 1, options.stats = &stats;
+        trace_any(scene, rays, occluded, options);
+        return std::pair(occluded, stats.lane_utilization());
+    };
+    for (const bool is_fine : {false, true}) {
+        Scene scene = make_scene(tools::make_terrain(is_fine ? 200000 : 2000, 3));
+        scene.commit();
+        const auto rays = rays_over(scene.bounds());
+        for (const IsaId isa : built_isas()) {
+            if (!cpu_supports(isa)) continue;
+            CAPTURE(to_string(isa));
+            const auto want = trace(scene, rays, Mode::kSingle, isa).first;
+            CHECK(std::ranges::count(want, 1) > 1000);
+            CHECK(std::ranges::count(want, 0) > 1000);
+            const auto [by_auto, auto_lanes] = trace(scene, rays, Mode::kAuto, isa);
+            const auto [by_tiles, tile_lanes] = trace(scene, rays, Mode::kTile, isa);
+            CHECK(by_auto == want);
+            CHECK(by_tiles == want);
+            // Rays of streams are never idle, those of a tile's packets are.
+            CHECK(auto_lanes < 1.0);
+            if (is_fine) CHECK(1.0 - auto_lanes < 0.3 * (1.0 - tile_lanes));
+            if (!is_fine) CHECK(auto_lanes < 0.95);
+        }
     }
 }
 

@@ -61,16 +61,21 @@ TEST_CASE("rays that follow each other start near each other") {
     CHECK(sorted_way < 0.25f * way);
 }
 
-TEST_CASE("origins that are no points, far away, or in a flat world") {
+TEST_CASE("origins that are no points, far away, or all the same") {
     const float inf = INFINITY, nan = std::nanf("");
-    std::vector<Ray> rays(6);
-    const float x[] = {inf, -inf, nan, 1e38f, -1e38f, 0.5f};
-    for (std::size_t i = 0; i < rays.size(); ++i) rays[i].org = {x[i], 0, x[i]};
-    StreamOrder order;
-    for (const Bounds3f& world : {Bounds3f{{0, 0, 0}, {1, 1, 1}}, Bounds3f{{0, 0, 0}, {0, 0, 0}},
-                                  Bounds3f{{-1.8e18f, 0, 0}, {1.8e18f, 0, 1e-40f}}}) {
-        const auto sorted = order.sort(rays);
-        CHECK(std::accumulate(sorted.begin(), sorted.end(), 0u) == 15);
+    const std::vector<std::vector<float>> rows = {
+        {inf, -inf, nan, 1e38f, -1e38f, 0.5f}, {nan, nan}, {1e-40f, 0.0f, 2e-40f}, {7, 7, 7, 7}};
+    for (const std::vector<float>& row : rows) {
+        std::vector<Ray> rays(64);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            rays[i].org = {row[i % row.size()], 0, row[i % row.size()]};
+        }
+        StreamOrder order;
+        std::vector<std::uint32_t> all(rays.size()), want(rays.size());
+        std::ranges::copy(order.sort(rays), all.begin());
+        std::ranges::sort(all);
+        std::iota(want.begin(), want.end(), 0u);
+        CHECK(all == want);
     }
 }
 
