@@ -80,7 +80,7 @@ TEST_CASE("an instance holds rays from inside at all features, whatever its tran
     Scene scene;
     scene.add_mesh(mesh);
     std::vector<Ray> rays;
-    while (scene.instances().size() < 30) {
+    while (scene.instances().size() < share_of(30, 3)) {
         const std::size_t i = scene.instances().size();
         glm::mat4x3 m;
         for (int column = 0; column < 3; ++column) m[column] = random.direction();
