@@ -14,7 +14,14 @@ struct Probe {
     [[gnu::noinline]] static std::uint32_t rays_meet_triangle(const ShearRays<N, Isa>& ray,
                                                               const TriangleBlock& block,
                                                               int lane) {
-        return shear<directions>(ray, SameTriangle{block, lane}).may_hit().bits();
+        std::uint32_t bits = 0;
+        const TriangleBlock* triangles = &block;
+        for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {  // as meet_triangle() does
+            const auto sheared = shear<directions>(part(ray, i), SameTriangle{*triangles, lane});
+            bits |= sheared.may_hit().bits() << i * kPartSize<N, Isa>;
+            asm("" : "+r"(triangles), "+r"(bits));  // stands for the branch to decide_hits()
+        }
+        return bits;
     }
     [[gnu::noinline]] static void rays_hit_triangle(const PreparedRays<N, Isa>& ray,
                                                     const TriangleBlock& block, int lane,

@@ -1,6 +1,7 @@
 // Every structure, mode, width, instruction set and number of threads against the oracle.
 #include "configurations.h"
 #include "generate.h"
+#include "share.h"
 #include "test_rays.h"
 
 #include <doctest/doctest.h>
@@ -21,7 +22,7 @@ TEST_CASE("a small scene of every kind [baseline]") {
 }
 
 TEST_CASE("200 random soups") {
-    for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    for (std::uint64_t seed = 0; seed < share_of(200, 10); ++seed) {
         Scene scene = make_scene(tools::make_soup(1 + seed * 7 % 101, seed));
         const auto rays = random_rays(scene.bounds(), 4096, seed + 1000);
         check_agreement(scene, rays, "soup of seed " + std::to_string(seed));
@@ -30,7 +31,7 @@ TEST_CASE("200 random soups") {
 
 TEST_CASE("larger scenes of every kind") {
     for (const tools::SceneKind& kind : tools::kSceneKinds) {
-        Scene scene = make_scene(kind.make(20000, 5));
+        Scene scene = make_scene(kind.make(share_of(20000, 3000), 5));
         const auto rays = random_rays(scene.bounds(), 2048, 23);
         check_agreement(scene, rays, std::string(kind.name));
     }

@@ -1,6 +1,7 @@
 // Structures: what any of them must hold, whatever the triangles.
 #include "configurations.h"
 #include "generate.h"
+#include "share.h"
 #include "test_rays.h"
 
 #include "build/tree.h"
@@ -209,7 +210,8 @@ std::vector<unsigned char> bytes_of(const Tree& tree) {
 
 TEST_CASE("a tree holds every triangle, whole or in parts, in boxes that contain it") {
     for (const tools::SceneKind& kind : tools::kSceneKinds) {
-        for (const std::size_t count : {1u, 2u, 3u, 10u, 1000u, 10000u}) {
+        for (const std::size_t all : {1u, 2u, 3u, 10u, 1000u, 10000u}) {
+            const std::size_t count = share_of(all, 500);
             CAPTURE(kind.name);
             CAPTURE(count);
             for_each_accel(
@@ -253,12 +255,12 @@ TEST_CASE("triangles that can never be hit are skipped and counted by reason") {
 TEST_CASE("100,000 identical triangles, and as many with one centroid") {
     TriangleMesh same;
     same.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    same.triangles.assign(100000, {0, 1, 2});
+    same.triangles.assign(share_of(100000, 5000), {0, 1, 2});
     for_each_accel(
         [&](const BuildOptions& options) { CHECK(check_tree(same, options).depth <= 20); });
 
     TriangleMesh rings;
-    for (std::uint32_t i = 0; i < 100000; ++i) {
+    for (std::uint32_t i = 0; i < share_of(100000, 5000); ++i) {
         const float r = 1.0f + static_cast<float>(i);
         rings.positions.insert(rings.positions.end(), {{-r, -r, 0}, {r, -r, 0}, {0, r, 0}});
         rings.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
@@ -295,13 +297,13 @@ TEST_CASE("leaves are no larger than asked") {
 }
 
 TEST_CASE("the tree is the same, to the byte, for any number of threads and every time") {
-    const TriangleMesh mesh = tools::make_city(120000, 5);
+    const TriangleMesh mesh = tools::make_city(70000, 5);  // every loop is cut into pieces
     for_each_accel([&](BuildOptions options) {
         options.threads = 1;
         const auto want = bytes_of(build_tree(mesh.view(), options));
         for (const int threads : {1, 2, 8}) {
             options.threads = threads;
-            for (int repeat = 0; repeat < 3; ++repeat) {
+            for (std::size_t repeat = 0; repeat < share_of(10); ++repeat) {
                 CHECK(bytes_of(build_tree(mesh.view(), options)) == want);
             }
         }

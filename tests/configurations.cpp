@@ -1,7 +1,10 @@
 #include "configurations.h"
 
+#include "share.h"
+
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <iostream>
 
@@ -91,14 +94,43 @@ static void check_configuration(const Scene& scene, std::span<const Ray> rays,
     CHECK(different == 0);
 }
 
+namespace {
+
+/// A share of the rays for each configuration, so that together the configurations trace all. It is
+/// enough for a beam around a tile, or for several tasks if there are threads to share them.
+class Shares {
+public:
+    explicit Shares(std::size_t all) : all_(all) {}
+
+    struct Range {
+        std::size_t first, count;
+    };
+    Range next(int threads) {
+        constexpr std::size_t kLeast = 128, kLeastForTasks = 1100;
+        const std::size_t count = share_of(all_, threads == 1 ? kLeast : kLeastForTasks);
+        if (begin_ >= all_) begin_ = 0;
+        const std::size_t first = std::min(begin_, all_ - count);
+        begin_ = first + count;
+        return {first, count};
+    }
+
+private:
+    std::size_t all_, begin_ = 0;
+};
+
+}  // namespace
+
 void check_agreement(Scene scene, std::span<const Ray> rays, const std::string& label) {
     INFO(label);
     const std::vector<Hit> want = Oracle(scene).closest(rays);
+    Shares shares(rays.size());
     for (const Build& build : all_builds()) {
         INFO(build.name);
         scene.commit(build.options);
         for (const Configuration& configuration : all_configurations(build.options.accel)) {
-            check_configuration(scene, rays, want, configuration);
+            const auto [first, count] = shares.next(configuration.threads);
+            check_configuration(scene, rays.subspan(first, count),
+                                std::span(want).subspan(first, count), configuration);
         }
     }
 }

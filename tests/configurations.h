@@ -42,7 +42,7 @@ struct Build {
 
 /// Builds every structure over the scene, in each way, traces the rays in every configuration,
 /// closest-hit and any-hit, and CHECKs that all are equal to the oracle, bit for bit. `label` names
-/// the case.
+/// the case. Under a share of the work (share.h) each configuration traces other rays.
 void check_agreement(Scene scene, std::span<const Ray> rays, const std::string& label);
 
 }  // namespace packet::test

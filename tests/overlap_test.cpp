@@ -2,6 +2,7 @@
 #include "build/overlap.h"
 #include "dispatch/dispatch.h"
 #include "overlap_pairs.h"
+#include "share.h"
 
 #include <packet/isa.h>
 
@@ -218,17 +219,18 @@ TEST_CASE("boxes that touch a triangle overlap it, on every instruction set [bas
 
 TEST_CASE("both tests are right on 10 million pairs of all kinds") {
     OverlapCases cases(3);
-    check_isa(default_isa(), 1'250'000, [&] { return cases.any(); });
+    check_isa(default_isa(), static_cast<int>(share_of(1'250'000)), [&] { return cases.any(); });
 }
 
 TEST_CASE("every instruction set and width gives the same answers") {
+    const int cases_each = static_cast<int>(share_of(50'000));
     for (const IsaId isa : built_isas()) {
         OverlapCases cases(4);
-        check_isa(isa, 50'000, [&] { return cases.any(); });
+        check_isa(isa, cases_each, [&] { return cases.any(); });
     }
     OverlapCases cases(4);
     Tally tally;
-    for (int i = 0; i < 50'000; ++i) {
+    for (int i = 0; i < cases_each; ++i) {
         const OverlapCase in = cases.any();
         const FloatCase floats = to_floats(in);
         tally.add(floats, reference_bits(in), ask_one_by_one(floats));

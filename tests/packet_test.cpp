@@ -1,6 +1,10 @@
 // The packet interface: active lanes get the oracle's hits, the others keep every bit.
+#include "configurations.h"
+#include "dispatch/dispatch.h"
 #include "generate.h"
 #include "oracle.h"
+#include "scene/scene_accel.h"
+#include "share.h"
 #include "test_rays.h"
 
 #include <doctest/doctest.h>
@@ -35,20 +39,48 @@ RayPacket<N> pack(std::span<const Ray> rays, LaneMask<N> active) {
     return packet;
 }
 
-template <int N>
-void check_masks(const Scene& scene, std::uint64_t seed) {
+/// By the interface, and thus by the best instruction set.
+struct ByInterface {
+    const Scene& scene;
+
+    template <int N>
+    LaneMask<N> trace(const RayPacket<N>& rays, LaneMask<N> active, HitPacket<N>& hits) const {
+        trace_closest(scene, rays, active, hits);
+        return trace_any(scene, rays, active);
+    }
+};
+
+/// By the kernels of any instruction set.
+struct ByKernels {
+    const Scene& scene;
+    const KernelTable& kernels;
+
+    template <int N>
+    LaneMask<N> trace(const RayPacket<N>& rays, LaneMask<N> active, HitPacket<N>& hits) const {
+        const SceneView& view = scene.accel().view;
+        if constexpr (N == 8) {
+            kernels.closest8(view, rays, active.bits, hits);
+            return {kernels.any8(view, rays, active.bits)};
+        } else {
+            kernels.closest16(view, rays, active.bits, hits);
+            return {kernels.any16(view, rays, active.bits)};
+        }
+    }
+};
+
+template <int N, class By>
+void check_masks(const By& by, const Oracle& oracle, std::uint64_t seed, int rounds) {
     tools::Random random(seed);
-    const Oracle oracle(scene);
-    for (int round = 0; round < 400; ++round) {
+    for (int round = 0; round < rounds; ++round) {
         CAPTURE(round);
         CAPTURE(seed);
-        const auto rays = random_rays(scene.bounds(), N, seed + static_cast<std::uint64_t>(round));
+        const auto rays =
+            random_rays(by.scene.bounds(), N, seed + static_cast<std::uint64_t>(round));
         LaneMask<N> active{static_cast<std::uint32_t>(random.next()) & LaneMask<N>::kAllBits};
         if (round < N) active = LaneMask<N>::first(round);
         const RayPacket<N> packet = pack<N>(rays, active);
         Sentinel<N> out;
-        trace_closest(scene, packet, active, out.hits);
-        const LaneMask<N> occluded = trace_any(scene, packet, active);
+        const LaneMask<N> occluded = by.trace(packet, active, out.hits);
         for (int lane = 0; lane < N; ++lane) {
             CAPTURE(lane);
             const Hit want = oracle.closest(rays[static_cast<std::size_t>(lane)]);
@@ -68,8 +100,37 @@ void check_masks(const Scene& scene, std::uint64_t seed) {
 TEST_CASE("packets of 8 and 16 lanes under random masks leave inactive lanes as they were") {
     Scene scene = make_scene(tools::make_soup(300, 11));
     scene.commit();
-    check_masks<8>(scene, 1);
-    check_masks<16>(scene, 2);
+    const Oracle oracle(scene);
+    check_masks<8>(ByInterface{scene}, oracle, 1, 400);
+    check_masks<16>(ByInterface{scene}, oracle, 2, 400);
+}
+
+TEST_CASE("masks hold in every structure, on every instruction set, in one mesh and in instances") {
+    Scene instances;
+    instances.add_mesh(tools::make_soup(60, 13));
+    instances.add_mesh(tools::make_sphere(72));
+    tools::Random random(14);
+    for (std::uint32_t i = 0; i < 12; ++i) {
+        glm::mat4x3 m;
+        for (int column = 0; column < 3; ++column) m[column] = random.direction();
+        m[3] = 3.0f * random.point();
+        instances.add_instance(i % 2, m);
+    }
+    for (Scene scene : {make_scene(tools::make_soup(200, 15)), instances}) {
+        const Oracle oracle(scene);
+        for (const Build& build : all_builds()) {
+            CAPTURE(build.name);
+            scene.commit(build.options);
+            for (const IsaId isa : built_isas()) {
+                if (!cpu_supports(isa)) continue;
+                CAPTURE(to_string(isa));
+                const ByKernels by{scene, select_kernels(isa)};
+                const int rounds = static_cast<int>(share_of(60, 20));
+                check_masks<8>(by, oracle, 3, rounds);
+                check_masks<16>(by, oracle, 4, rounds);
+            }
+        }
+    }
 }
 
 TEST_CASE("1 to 100 rays, in any number of whole and partial packets") {
@@ -79,9 +140,9 @@ TEST_CASE("1 to 100 rays, in any number of whole and partial packets") {
     for (std::size_t count = 1; count <= 100; ++count) {
         const auto rays = random_rays(scene.bounds(), count, count);
         const auto want = oracle.closest(rays);
-        for (const Mode mode : {Mode::kSingle, Mode::kPacket8, Mode::kPacket16}) {
+        for (const ModeName& mode : mode_names()) {
             TraceOptions options;
-            options.mode = mode;
+            options.mode = mode.mode;
             std::vector<Hit> hits(count + 1);
             hits[count].t = -7.0f;
             trace_closest(scene, rays, std::span(hits).first(count), options);

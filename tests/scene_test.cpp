@@ -75,29 +75,44 @@ TEST_CASE("instances answer as the flattened scene does, with ids mapped") {
         triangles += static_cast<std::uint32_t>(scene.meshes()[i % 2].triangles.size());
     }
     scene.commit();
-    Scene flat = make_scene(scene.flatten());
+    const TriangleMesh mesh = scene.flatten();
+    Scene flat = make_scene(mesh);
     flat.commit();
+    // How far apart points may be that rounding a transform parts, across a triangle's plane.
+    const float slack = 1e-6f * glm::length(scene.bounds().extent());
+    const auto across = [&](const Ray& ray, std::uint32_t prim_id) {
+        const glm::uvec3 t = mesh.triangles[prim_id];
+        const glm::vec3 a = mesh.positions[t.x];
+        const glm::vec3 normal = glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a);
+        return std::abs(glm::dot(ray.dir, glm::normalize(normal)));
+    };
     CHECK(scene.triangle_count() == triangles);
     CHECK(flat.triangle_count() == triangles);
     const auto rays = random_rays(scene.bounds(), 100000, 7);
     std::vector<Hit> hits(rays.size()), flat_hits(rays.size());
     trace_closest(scene, rays, hits);
     trace_closest(flat, rays, flat_hits);
-    std::size_t different = 0, hit_count = 0;
+    std::size_t hit_count = 0, moved = 0, neighbours = 0, silhouettes = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         const Hit &a = hits[i], &b = flat_hits[i];
         hit_count += a.is_hit();
-        if (!a.is_hit() || !b.is_hit()) {
-            different += a.is_hit() != b.is_hit();
-            continue;
+        if (a.is_hit() != b.is_hit()) {
+            ++silhouettes;
+        } else if (a.is_hit()) {
+            const bool same = first_triangle[a.instance_id] + a.prim_id == b.prim_id;
+            const float apart = std::abs(a.t - b.t);
+            const bool near = apart <= 1e-5f * std::max(1.0f, std::abs(b.t)) ||
+                              apart * across(rays[i], b.prim_id) <= slack;  // it grazes
+            moved += same && !near;
+            neighbours += !same && near;
+            silhouettes += !same && !near;
         }
-        const bool same = first_triangle[a.instance_id] + a.prim_id == b.prim_id;
-        const bool near = std::abs(a.t - b.t) <= 1e-5f * std::max(1.0f, std::abs(b.t));
-        different += !near && !same;
     }
     CHECK(hit_count > 4000);
-    // Silhouettes: the transforms round, so a ray that grazes an outline may fall to either side.
-    CHECK(different <= 5);
+    CHECK(moved == 0);
+    // The transforms round, so a ray at an edge may fall to either side of it.
+    CHECK(neighbours <= 5);
+    CHECK(silhouettes <= 5);
 }
 
 TEST_CASE("10,000 instances of a large mesh take under 200 bytes each") {
