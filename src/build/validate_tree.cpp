@@ -280,8 +280,10 @@ private:
                 "treelet", 0, "they are not all nodes");
         std::size_t cut_edges = 0;
         std::uint32_t most_exits = 0;
-        for (std::uint32_t t = 0; t < count; ++t) {
+        for (std::size_t t = 0; t < count; ++t) {
             require(begin[t] < begin[t + 1], "treelet", t, "has no nodes");
+        }
+        for (std::uint32_t t = 0; t < count; ++t) {
             std::uint32_t exits = 0;
             for (std::uint32_t i = begin[t]; i < begin[t + 1]; ++i) {
                 require(of[i] == t, "treelet", t, "a node of it is noted as another's");
