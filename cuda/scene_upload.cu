@@ -1,9 +1,15 @@
 #include "scene_upload.h"
 
+#include "device_references.h"
+#include "kd_build.h"
+#include "morton_build.h"
 #include "scene/scene_accel.h"
+
+#include <packet/error.h>
 
 #include <algorithm>
 #include <cstring>
+#include <string>
 
 namespace packet::cuda {
 
@@ -22,30 +28,78 @@ static std::vector<DeviceTriangle> unpack(std::span<const TriangleBlock> blocks)
 }
 
 /// Throws unless stacks of the kernels can hold a walk down the tree. All builders see to it.
-static int checked_depth(const BuildStats& stats) {
-    if (stats.depth <= kMaxDepth) return stats.depth;
-    throw Error(ErrorCode::kUnsupported, "a tree is " + std::to_string(stats.depth) +
+static int checked_depth(int depth) {
+    if (depth <= kMaxDepth) return depth;
+    throw Error(ErrorCode::kUnsupported, "a tree is " + std::to_string(depth) +
                                              " deep, more than " + std::to_string(kMaxDepth));
 }
 
-UploadedScene::UploadedScene(const SceneAccel& accel) : view_(accel.view) {
+/// Throws unless the mesh has what is walked here: a tree, in its binary form.
+static void require_binary_tree(const TreeView& tree, std::size_t mesh_id) {
+    const std::string mesh = "mesh " + std::to_string(mesh_id);
+    if (tree.grid.bricks != nullptr) {
+        throw Error(ErrorCode::kUnsupported,
+                    mesh + " is in a grid, which CUDA devices do not walk: choose a tree");
+    }
+    if (tree.nodes == nullptr && tree.wide_nodes != nullptr) {
+        throw Error(ErrorCode::kUnsupported,
+                    mesh + " has no binary nodes, which CUDA devices walk: commit with them");
+    }
+}
+
+UploadedScene::UploadedScene(const SceneAccel& accel) {
     std::vector<DeviceTree> trees;
     int depth = 0;
     for (std::size_t i = 0; i < accel.trees.size(); ++i) {
-        if (accel.tree_views[i].grid.bricks != nullptr) {
-            throw Error(ErrorCode::kUnsupported,
-                        "mesh " + std::to_string(i) +
-                            " is in a grid, which CUDA devices do not walk: choose a tree");
-        }
-        depth = std::max(depth, checked_depth(accel.trees[i].stats));
+        require_binary_tree(accel.tree_views[i], i);
+        depth = std::max(depth, checked_depth(accel.trees[i].stats.depth));
         trees.push_back(upload(accel.tree_views[i], accel.trees[i].blocks.size()));
     }
-    stack_depth_ = static_cast<std::uint32_t>(std::max(1, depth + checked_depth(accel.top.stats)));
-    trees_ = DeviceArray<DeviceTree>(std::span<const DeviceTree>(trees));
+    upload_top(accel, trees, depth);
+}
 
+static DeviceHierarchy build_hierarchy(const UploadedMesh& mesh, const BuildOptions& options) {
+    DeviceReferences references = collect_references(mesh);
+    const AccelKind kind = chosen_accel(options);
+    if (kind == AccelKind::kBvhMorton) {
+        return build_bvh_morton(std::move(references.items), references.count, options);
+    }
+    if (kind == AccelKind::kKdSah && options.kd_build == KdBuild::kBreadthFirst) {
+        return build_kd_levels(mesh, std::move(references.items), references.count, options);
+    }
+    throw Error(ErrorCode::kUnsupported,
+                "CUDA devices build bvh-morton and breadth-first kd-sah, not " +
+                    std::string(to_string(kind)));
+}
+
+UploadedScene::UploadedScene(const Scene& scene, const BuildOptions& options) {
+    validate(options);
+    std::vector<DeviceTree> trees;
+    std::vector<Bounds3f> boxes;
+    int depth = 0;
+    for (const TriangleMesh& mesh : scene.meshes()) {
+        const UploadedMesh uploaded(mesh.view());
+        DeviceBuiltTree tree = lay_out(build_hierarchy(uploaded, options), uploaded);
+        depth = std::max(depth, checked_depth(tree.depth));
+        trees.push_back(tree.view());
+        boxes.push_back(tree.bounds);
+        arrays_.push_back(std::move(tree.arrays));
+    }
+    SceneAccel top;
+    build_top(scene.instances(), boxes, options, Parallel(options.threads), top);
+    upload_top(top, trees, depth);
+}
+
+void UploadedScene::upload_top(const SceneAccel& accel, std::span<const DeviceTree> trees,
+                               int depth) {
+    view_ = accel.view;
+    bounds_ = accel.top.bounds;
+    depth += checked_depth(accel.top.stats.depth);
+    stack_depth_ = static_cast<std::uint32_t>(std::max(1, depth));
+    trees_ = DeviceArray<DeviceTree>(trees);
     std::vector<InstanceView> instances = accel.instances;
     for (InstanceView& instance : instances) {
-        instance.tree = trees_.data() + (instance.tree - accel.tree_views.data());
+        instance.tree = trees_.data() + accel.mesh_of_instance[instance.instance_id];
     }
     instances_ = DeviceArray<InstanceView>(std::span<const InstanceView>(instances));
     mesh_of_instance_ =

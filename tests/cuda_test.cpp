@@ -84,6 +84,39 @@ TEST_CASE("a scene of instances, some of one mesh") {
     check_device(scene, random_rays(scene.bounds(), 1000, 29), "instances");
 }
 
+TEST_CASE("a scene that is built on the device") {
+    if (!has_device()) return;
+    Scene scene;
+    const std::uint32_t city = scene.add_mesh(tools::make_city(800, 3));
+    const std::uint32_t soup = scene.add_mesh(tools::make_soup(60, 5));
+    const std::uint32_t empty = scene.add_mesh({});
+    for (const std::uint32_t mesh : {city, soup, empty, soup}) {
+        glm::mat4x3 placed(1.0f + 0.3f * static_cast<float>(mesh));
+        placed[3] = glm::vec3(0.7f * static_cast<float>(scene.instances().size()));
+        scene.add_instance(mesh, placed);
+    }
+    const std::vector<Ray> rays = random_rays(scene.bounds(), 500, 31);
+    Scene committed = scene;
+    committed.commit();
+    std::vector<Hit> want(rays.size());
+    trace_closest(committed, rays, want);
+    for (const AccelKind kind : {AccelKind::kBvhMorton, AccelKind::kKdSah}) {
+        BuildOptions options;
+        options.accel = kind;
+        INFO(to_string(kind));
+        const DeviceScene device(scene, options);
+        for (const DeviceMode mode : kModes) check_mode(device, rays, want, {mode, 0, nullptr});
+    }
+    for (const AccelKind kind : {AccelKind::kBvh, AccelKind::kGrid}) {
+        BuildOptions options;
+        options.accel = kind;
+        CHECK_THROWS_WITH((DeviceScene{scene, options}),
+                          ("CUDA devices build bvh-morton and breadth-first kd-sah, not " +
+                           std::string(to_string(kind)))
+                              .c_str());
+    }
+}
+
 TEST_CASE("rays at features, rays without sense, no rays, no triangles") {
     if (!has_device()) return;
     const TriangleMesh grid =
