@@ -63,7 +63,8 @@ public:
     Builder(const UploadedMesh& mesh, const BuildOptions& options, std::uint32_t count)
         : mesh_(mesh.view()),
           limits_{options, max_cut_depth(count), static_cast<std::uint32_t>(options.max_leaf_size)},
-          spare_(spare_of_root(count, options, kMaxReferences)) {
+          spare_(spare_of_root(count, options, kMaxReferences)),
+          small_step_(mesh_, KdStage::kSmall, limits_, stream_) {
         if (count + spare_ > kMaxDeviceReferences) {
             throw Error(ErrorCode::kTooLarge,
                         "a k-d tree of up to " + std::to_string(count + spare_) +
@@ -129,11 +130,10 @@ private:
         batch.nodes.count = count;
         batch.level_ends.push_back(count);
         leaves_.reference_count = leaves_.cell_count = 0;
-        KdStep step(mesh_, KdStage::kSmall, limits_, stream_);
         while (level_.cell_count != 0) {
-            step.make_room(level_);
-            masks_.find(level_, limits_, step.planes(), step.fates(), stream_);
-            step.advance(level_, leaves_, batch.nodes);
+            small_step_.make_room(level_);
+            masks_.find(level_, limits_, small_step_.planes(), small_step_.fates(), stream_);
+            small_step_.advance(level_, leaves_, batch.nodes);
             batch.level_ends.push_back(batch.nodes.count);
         }
         append_batch(batch, leaves_, small.cells.data() + first, count, out_, stream_);
@@ -159,6 +159,7 @@ private:
     std::size_t spare_;
     DeviceHierarchy out_;
     // Of a batch; they keep their memory.
+    KdStep small_step_;
     KdMaskPlanes masks_;
     KdDeviceLevel level_, leaves_;
 };

@@ -137,16 +137,16 @@ __global__ void make_children(KdLevelView level, KdStage stage, KdStep::View ste
     }
     is_parent[i] = count.low != 0 && count.high != 0 ? 1 : 0;
     for (std::uint32_t s = 0; s < 2; ++s) {
-        const bool leaves = stage == KdStage::kLarge ? child[s].count <= kMaxSmallCell : is_leaf;
+        const bool goes_out = stage == KdStage::kLarge ? child[s].count <= kMaxSmallCell : is_leaf;
         const auto references = static_cast<std::uint32_t>(child[s].count);
         const std::uint32_t cells = references != 0 ? 1 : 0;
         step.children[2 * i + s] = child[s];
         step.bounds[2 * i + s] = OrderedBounds::empty();
         step.sets[2 * i + s] = 0;
-        step.destinations[2 * i + s].leaves = leaves;
+        step.destinations[2 * i + s].goes_out = goes_out;
         reference_counts[2 * i + s] =
-            pack(leaves ? CountPair{0, references} : CountPair{references, 0});
-        cell_counts[2 * i + s] = pack(leaves ? CountPair{0, cells} : CountPair{cells, 0});
+            pack(goes_out ? CountPair{0, references} : CountPair{references, 0});
+        cell_counts[2 * i + s] = pack(goes_out ? CountPair{0, cells} : CountPair{cells, 0});
     }
 }
 
@@ -155,9 +155,9 @@ struct KdBases {
     std::uint32_t out_reference, out_cell, node;
 };
 
-PACKET_DEVICE std::uint32_t place_of(std::uint64_t sums, bool leaves, std::uint32_t out_base) {
+PACKET_DEVICE std::uint32_t place_of(std::uint64_t sums, bool goes_out, std::uint32_t out_base) {
     const CountPair sum = unpack_counts(sums);
-    return leaves ? out_base + sum.high : sum.low;
+    return goes_out ? out_base + sum.high : sum.low;
 }
 
 /// Gives children their places and nodes.
@@ -175,14 +175,14 @@ __global__ void place_children(KdLevelView level, KdStep::View step, KdBases bas
     for (std::uint32_t s = 0; s < 2; ++s) {
         const std::uint32_t c = 2 * i + s;
         KdDestination& to = step.destinations[c];
-        to.first = place_of(reference_sums[c], to.leaves, bases.out_reference);
-        to.cell = place_of(cell_sums[c], to.leaves, bases.out_cell);
+        to.first = place_of(reference_sums[c], to.goes_out, bases.out_reference);
+        to.cell = place_of(cell_sums[c], to.goes_out, bases.out_cell);
         if (step.children[c].count == 0) continue;
         KdSetCell child{step.children[c], 0, cell.root};
         child.first = to.first;
         // A node of one child is that child.
         child.node = is_parent[i] != 0 ? first_node + s : cell.node;
-        (to.leaves ? out : next)[to.cell] = child;
+        (to.goes_out ? out : next)[to.cell] = child;
     }
 }
 
@@ -224,7 +224,7 @@ __global__ void move_references(KdLevelView level, KdStage stage, KdStep::View s
         if (goes) {
             const KdDestination& to = step.destinations[child];
             const std::uint32_t place = to.first + (s == 0 ? rank.low : rank.high);
-            const KdTarget& target = to.leaves ? out : next;
+            const KdTarget& target = to.goes_out ? out : next;
             target.references[place] = {box.lower, r.id, box.upper, r.unused};
             target.cell_of[place] = to.cell;
             if (stage == KdStage::kSmall) {
@@ -241,7 +241,7 @@ __global__ void finish_children(std::uint32_t cell_count, KdStep::View step, KdS
     const unsigned c = thread_in_grid();
     if (c >= 2 * cell_count || step.children[c].count == 0) return;
     const KdDestination& to = step.destinations[c];
-    KdSetCell& child = (to.leaves ? out : next)[to.cell];
+    KdSetCell& child = (to.goes_out ? out : next)[to.cell];
     child.bounds = step.bounds[c].bounds();
     child.set = step.sets[c];
 }
@@ -279,9 +279,12 @@ void KdStep::advance(KdDeviceLevel& level, KdDeviceLevel& out, KdNodes& nodes) {
     choose_sides(level);
     cut(level);
     sum_sides(level);
-    if (stage_ == KdStage::kSmall && check_depth(level) != 0) {
-        part_without_cutting(level);
-        sum_sides(level);
+    if (stage_ == KdStage::kSmall) {
+        check_depth(level);
+        if (counter_.value(0, stream_) != 0) {
+            part_without_cutting(level);
+            sum_sides(level);
+        }
     }
     move(level, out, nodes);
 }
@@ -291,7 +294,7 @@ void KdStep::choose_sides(const KdDeviceLevel& level) {
     if (stage_ == KdStage::kLarge) {
         // Before they are cut: cutting takes away only what is not there.
         sum_sides(level);
-        (void)check_depth(level);
+        check_depth(level);
     }
     counter_.fill_bytes(0, stream_.get());
     for_each_item(level.cell_count, stream_, count_halved, fates_.data(), level.cell_count,
@@ -299,11 +302,10 @@ void KdStep::choose_sides(const KdDeviceLevel& level) {
     if (counter_.value(0, stream_) != 0) part_without_cutting(level);
 }
 
-std::uint32_t KdStep::check_depth(const KdDeviceLevel& level) {
+void KdStep::check_depth(const KdDeviceLevel& level) {
     counter_.fill_bytes(0, stream_.get());
     for_each_item(level.cell_count, stream_, limit_depth, level.view(), stage_, limits_, view(),
                   counter_.data());
-    return counter_.value(0, stream_);
 }
 
 /// Sides of references of cells that are halved or left whole. A sort of the whole level, but few
@@ -347,9 +349,14 @@ void KdStep::move(KdDeviceLevel& level, KdDeviceLevel& out, KdNodes& nodes) {
     prefix_sums_(reference_counts_.data(), reference_sums_.data(), children, stream_.get());
     prefix_sums_(cell_counts_.data(), cell_sums_.data(), children, stream_.get());
     prefix_sums_(is_parent_.data(), parent_sums_.data(), cells, stream_.get());
-    const CountPair references = unpack_counts(reference_sums_.value(children, stream_));
-    const CountPair new_cells = unpack_counts(cell_sums_.value(children, stream_));
-    const std::uint32_t new_nodes = 2 * parent_sums_.value(cells, stream_);
+    std::uint64_t reference_sum, cell_sum;
+    std::uint32_t parents;
+    reference_sums_.copy_value(children, &reference_sum, stream_.get());
+    cell_sums_.copy_value(children, &cell_sum, stream_.get());
+    parent_sums_.copy_value(cells, &parents, stream_.get());
+    stream_.synchronize();
+    const CountPair references = unpack_counts(reference_sum), new_cells = unpack_counts(cell_sum);
+    const std::uint32_t new_nodes = 2 * parents;
     next_.reference_count = next_.cell_count = 0;
     next_.grow(references.low, new_cells.low, stream_);
     out.grow(references.high, new_cells.high, stream_);

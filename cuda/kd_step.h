@@ -23,7 +23,7 @@ struct KdNodes {
 struct KdDestination {
     std::uint32_t first;  ///< reference
     std::uint32_t cell;
-    bool leaves;  ///< goes out; else to the next level
+    bool goes_out;  ///< of the stage; else to the next level
 };
 
 /// Cuts levels of one stage. Keeps its memory from level to level.
@@ -57,8 +57,8 @@ public:
 
 private:
     void choose_sides(const KdDeviceLevel& level);
-    /// Yields how many cells' fates it has changed.
-    [[nodiscard]] std::uint32_t check_depth(const KdDeviceLevel& level);
+    /// Counts in `counter_` the cells whose fates it has changed.
+    void check_depth(const KdDeviceLevel& level);
     void part_without_cutting(const KdDeviceLevel& level);
     void sum_sides(const KdDeviceLevel& level);
     void cut(const KdDeviceLevel& level);

@@ -102,11 +102,14 @@ public:
         check(cudaMemcpyAsync(data_, values, count * sizeof(T), cudaMemcpyDeviceToDevice, stream),
               "copy on the device");
     }
+    void copy_value(std::size_t index, T* to, cudaStream_t stream) const {
+        check(cudaMemcpyAsync(to, data_ + index, sizeof(T), cudaMemcpyDeviceToHost, stream),
+              "copy from the device");
+    }
     /// Waits for what is in the stream.
     [[nodiscard]] T value(std::size_t index, const Stream& stream) const {
         T out;
-        check(cudaMemcpyAsync(&out, data_ + index, sizeof(T), cudaMemcpyDeviceToHost, stream.get()),
-              "copy from the device");
+        copy_value(index, &out, stream.get());
         stream.synchronize();
         return out;
     }

@@ -1,8 +1,6 @@
 #include "scene_upload.h"
 
-#include "device_references.h"
-#include "kd_build.h"
-#include "morton_build.h"
+#include "device_build.h"
 #include "scene/scene_accel.h"
 
 #include <packet/error.h>
@@ -56,20 +54,6 @@ UploadedScene::UploadedScene(const SceneAccel& accel) {
         trees.push_back(upload(accel.tree_views[i], accel.trees[i].blocks.size()));
     }
     upload_top(accel, trees, depth);
-}
-
-static DeviceHierarchy build_hierarchy(const UploadedMesh& mesh, const BuildOptions& options) {
-    DeviceReferences references = collect_references(mesh);
-    const AccelKind kind = chosen_accel(options);
-    if (kind == AccelKind::kBvhMorton) {
-        return build_bvh_morton(std::move(references.items), references.count, options);
-    }
-    if (kind == AccelKind::kKdSah && options.kd_build == KdBuild::kBreadthFirst) {
-        return build_kd_levels(mesh, std::move(references.items), references.count, options);
-    }
-    throw Error(ErrorCode::kUnsupported,
-                "CUDA devices build bvh-morton and breadth-first kd-sah, not " +
-                    std::string(to_string(kind)));
 }
 
 UploadedScene::UploadedScene(const Scene& scene, const BuildOptions& options) {

@@ -3,15 +3,13 @@
 #include "build/kd_levels.h"
 #include "build/tree.h"
 #include "cuda_device.h"
-#include "device_references.h"
+#include "downloaded_build.h"
 #include "generate.h"
-#include "kd_build.h"
-#include "lay_out.h"
-#include "morton_build.h"
 #include "test_rays.h"
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -44,56 +42,37 @@ void for_thread_orders(Fn&& fn) {
     set_thread_order(0);
 }
 
-cuda::DeviceArray<Reference> upload(const AlignedVector<Reference>& references) {
-    return cuda::DeviceArray<Reference>(std::span<const Reference>(references));
-}
-
 void check_same(const AlignedVector<Reference>& references, const BuildOptions& options) {
     const Hierarchy want = build_bvh_morton(references, options, Parallel(1));
-    for_thread_orders([&] {
-        const auto count = static_cast<std::uint32_t>(references.size());
-        check_equal(cuda::build_bvh_morton(upload(references), count, options).download(), want);
-    });
+    for_thread_orders([&] { check_equal(cuda::download_bvh_morton(references, options), want); });
 }
 
-void check_same_kd_tree(const TriangleMesh& mesh, const BuildOptions& options) {
+void check_same_kd_tree(const TriangleMesh& mesh, BuildOptions options) {
+    options.accel = AccelKind::kKdSah;
     const References references = collect_references(mesh.view(), Parallel(1));
     const Hierarchy want = build_kd_levels(mesh.view(), references.items, options, Parallel(1));
-    for_thread_orders([&] {
-        const cuda::UploadedMesh uploaded(mesh.view());
-        cuda::DeviceReferences found = cuda::collect_references(uploaded);
-        REQUIRE(found.count == references.items.size());
-        check_equal(cuda::build_kd_levels(uploaded, std::move(found.items), found.count, options)
-                        .download(),
-                    want);
-    });
+    for_thread_orders([&] { check_equal(cuda::download_hierarchy(mesh.view(), options), want); });
 }
 
 /// A tree that is laid out on the device is the CPU's: each node, and what is in each leaf.
-void check_layout(const cuda::DeviceBuiltTree& got, const Tree& want) {
-    REQUIRE(got.node_count == want.nodes.size());
+void check_layout(const cuda::DownloadedTree& got, const Tree& want) {
+    REQUIRE(got.nodes.size() == want.nodes.size());
     CHECK(got.depth == want.stats.depth);
     CHECK(got.bounds == want.bounds);
-    const cuda::Stream stream;
-    std::vector<Node> nodes(got.node_count);
-    got.arrays.nodes.copy_to(nodes, stream.get());
-    std::vector<cuda::DeviceTriangle> triangles(got.arrays.triangles.size());
-    got.arrays.triangles.copy_to(triangles, stream.get());
-    stream.synchronize();
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const Node &a = nodes[i], &b = want.nodes[i];
+    for (std::size_t i = 0; i < got.nodes.size(); ++i) {
+        const Node &a = got.nodes[i], &b = want.nodes[i];
         REQUIRE(std::memcmp(a.plane, b.plane, sizeof(a.plane)) == 0);
         REQUIRE(a.count == b.count);
         if (!a.is_leaf()) REQUIRE(a.link == b.link);
         for (std::uint32_t k = 0; k < a.count; ++k) {
-            const cuda::DeviceTriangle& triangle = triangles[a.link + k];
+            const std::array<float, 12>& triangle = got.triangles[a.link + k];
             const TriangleBlock& block = want.blocks[(b.link + k) / kBlockSize];
             const std::uint32_t lane = (b.link + k) % kBlockSize;
-            REQUIRE(std::memcmp(&triangle.corner[0].w, &block.prim_id[lane], 4) == 0);
-            for (int c = 0; c < 3; ++c) {
-                REQUIRE(triangle.corner[c].x == block.v[c][0][lane]);
-                REQUIRE(triangle.corner[c].y == block.v[c][1][lane]);
-                REQUIRE(triangle.corner[c].z == block.v[c][2][lane]);
+            REQUIRE(std::memcmp(&triangle[3], &block.prim_id[lane], 4) == 0);
+            for (std::size_t corner = 0; corner < 3; ++corner) {
+                for (std::size_t axis = 0; axis < 3; ++axis) {
+                    REQUIRE(triangle[4 * corner + axis] == block.v[corner][axis][lane]);
+                }
             }
         }
     }
@@ -199,18 +178,10 @@ TEST_CASE("a k-d tree of a few triangles, of none, of many at one place, and of 
 TEST_CASE("the layout of a tree is the CPU's") {
     if (!has_device()) return;
     const TriangleMesh mesh = tools::make_city(2000, 3);
-    const cuda::UploadedMesh uploaded(mesh.view());
     for (const AccelKind kind : {AccelKind::kBvhMorton, AccelKind::kKdSah}) {
         BuildOptions options;
         options.accel = kind;
         const Tree want = build_tree(mesh.view(), options);
-        for_thread_orders([&] {
-            cuda::DeviceReferences found = cuda::collect_references(uploaded);
-            const cuda::DeviceHierarchy hierarchy =
-                kind == AccelKind::kKdSah
-                    ? cuda::build_kd_levels(uploaded, std::move(found.items), found.count, options)
-                    : cuda::build_bvh_morton(std::move(found.items), found.count, options);
-            check_layout(cuda::lay_out(hierarchy, uploaded), want);
-        });
+        for_thread_orders([&] { check_layout(cuda::download_tree(mesh.view(), options), want); });
     }
 }
