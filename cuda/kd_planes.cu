@@ -123,7 +123,7 @@ __global__ void fill_bins(KdLevelView level, const std::uint32_t* first_chunks,
     }
     __syncthreads();
     for (std::uint32_t word = threadIdx.x; word < kWordsOfCell; word += blockDim.x) {
-        join_word(bins + cell_id * kWordsOfCell, word, counted[word]);
+        join_word(bins + std::size_t{cell_id} * kWordsOfCell, word, counted[word]);
     }
 }
 
@@ -154,9 +154,9 @@ __global__ void choose_binned_planes(KdLevelView level, KdLimits limits, const s
         const KdCost cost(cell, limits.prices);
         KdSearch<KdRange> search(cell, cost);
         for (int a = 0; a < 3; ++a) {
-            const KdBin bin =
-                load_bin(bins + id * kWordsOfCell + static_cast<std::uint32_t>(a) * kWordsOfAxis +
-                         lane_id() * kWordsOfBin);
+            const KdBin bin = load_bin(bins + std::size_t{id} * kWordsOfCell +
+                                       static_cast<std::size_t>(a) * kWordsOfAxis +
+                                       std::size_t{lane_id()} * kWordsOfBin);
             KdBinsBefore before;
             before.started = warp_sum_before(bin.start_count);
             before.ended = warp_sum_before(bin.end_count);
@@ -237,7 +237,7 @@ __global__ void make_masks(KdLevelView level, KdMaskPlanes::View masks) {
     const KdSet starts = ballot_pair(is_first[0], is_first[1]);
     const KdSet ends = ballot_pair(is_first[2], is_first[3]);
     const auto first_place = static_cast<std::uint32_t>(2 * cell.first);
-    KdMaskPlace* const to = masks.places + axis * masks.places_an_axis + first_place;
+    KdMaskPlace* const to = masks.places + std::size_t{axis} * masks.places_an_axis + first_place;
     for (std::uint32_t k = 0; k < 4; ++k) {
         if (is_first[k]) to[faces.rank(place[k].position, starts, ends)] = place[k];
     }
@@ -252,7 +252,7 @@ PACKET_DEVICE void sweep(const KdMaskPlanes::View& masks, const KdSetCell& cell,
     const auto a = static_cast<std::uint32_t>(axis);
     const std::uint32_t count = masks.place_counts[a * masks.roots + cell.root];
     const KdMaskPlace* const places =
-        masks.places + a * masks.places_an_axis + masks.first_places[cell.root];
+        masks.places + std::size_t{a} * masks.places_an_axis + masks.first_places[cell.root];
     float next_start = cell.bounds.upper[axis];
     for (std::uint32_t done = 0; done < count; done += kWarpSize) {
         // from the last place on
@@ -301,11 +301,12 @@ void KdBinPlanes::find(const KdDeviceLevel& level, const KdLimits& limits, KdPla
     bins_.make_room(std::size_t{cells} * kWordsOfCell);
     for_each_item(cells, stream, count_chunks, level.view(), chunk_counts_.data());
     prefix_sums_(chunk_counts_.data(), first_chunks_.data(), cells, stream.get());
-    for_each_item(cells * kWordsOfCell, stream, clear_bins, bins_.data(), cells * kWordsOfCell);
+    for_each_item(std::size_t{cells} * kWordsOfCell, stream, clear_bins, bins_.data(),
+                  cells * kWordsOfCell);
     // As many chunks as there can be: how many there are only the device knows.
     const std::uint32_t chunks = level.reference_count / kChunkSize + cells;
-    launch(fill_bins, {chunks, kItemThreads, 4 * kWordsOfCell, stream.get()}, level.view(),
-           first_chunks_.data(), bins_.data());
+    launch(fill_bins, {chunks, kItemThreads, sizeof(std::uint32_t) * kWordsOfCell, stream.get()},
+           level.view(), first_chunks_.data(), bins_.data());
     check(cudaGetLastError(), "launch of fill_bins");
     for_each_warp(cells, stream, choose_binned_planes, level.view(), limits, bins_.data(), planes,
                   fates);

@@ -2,6 +2,7 @@
 
 #include "device_build.h"
 #include "scene/scene_accel.h"
+#include "walkable.h"
 
 #include <packet/error.h>
 
@@ -32,24 +33,11 @@ static int checked_depth(int depth) {
                                              " deep, more than " + std::to_string(kMaxDepth));
 }
 
-/// Throws unless the mesh has what is walked here: a tree, in its binary form.
-static void require_binary_tree(const TreeView& tree, std::size_t mesh_id) {
-    const std::string mesh = "mesh " + std::to_string(mesh_id);
-    if (tree.grid.bricks != nullptr) {
-        throw Error(ErrorCode::kUnsupported,
-                    mesh + " is in a grid, which CUDA devices do not walk: choose a tree");
-    }
-    if (tree.nodes == nullptr && tree.wide_nodes != nullptr) {
-        throw Error(ErrorCode::kUnsupported,
-                    mesh + " has no binary nodes, which CUDA devices walk: commit with them");
-    }
-}
-
 UploadedScene::UploadedScene(const SceneAccel& accel) {
     std::vector<DeviceTree> trees;
     int depth = 0;
     for (std::size_t i = 0; i < accel.trees.size(); ++i) {
-        require_binary_tree(accel.tree_views[i], i);
+        require_walkable(accel.tree_views[i], i);
         depth = std::max(depth, checked_depth(accel.trees[i].stats.depth));
         trees.push_back(upload(accel.tree_views[i], accel.trees[i].blocks.size()));
     }

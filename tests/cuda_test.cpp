@@ -4,6 +4,7 @@
 #include "cuda_device.h"
 #include "generate.h"
 #include "test_rays.h"
+#include "walkable.h"
 
 #include <doctest/doctest.h>
 
@@ -161,6 +162,21 @@ TEST_CASE("work is counted as the CPU counts it") {
         CHECK(stats.lane_utilization() > 0.05);
         CHECK(stats.lane_utilization() <= 1.0);
     }
+}
+
+TEST_CASE("what is not walked on devices is refused by name") {
+    const Node node = {};
+    const GridBrick brick = {};
+    TreeView tree;
+    CHECK_NOTHROW(cuda::require_walkable(tree, 0));  // empty
+    tree.node_count = 1;
+    CHECK_THROWS_WITH(cuda::require_walkable(tree, 3),
+                      "mesh 3 has no binary nodes, which CUDA devices walk: build with them");
+    tree.nodes = &node;
+    CHECK_NOTHROW(cuda::require_walkable(tree, 3));
+    tree.grid.bricks = &brick;
+    CHECK_THROWS_WITH(cuda::require_walkable(tree, 4),
+                      "mesh 4 is in a grid, which CUDA devices do not walk: choose a tree");
 }
 
 TEST_CASE("errors of the device's interface") {

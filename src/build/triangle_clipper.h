@@ -30,10 +30,11 @@ struct Polygon {
     glm::dvec3 corner[kMaxCorners];
     int count = 0;
 
-    constexpr Polygon() noexcept {}
+    Polygon() = default;
     constexpr Polygon(const Polygon& other) noexcept { *this = other; }
     /// Copies the corners that there are.
     constexpr Polygon& operator=(const Polygon& other) noexcept {
+        if (this == &other) return *this;
         count = other.count;
         for (int i = 0; i < count; ++i) corner[i] = other.corner[i];
         return *this;
