@@ -42,6 +42,11 @@ public:
         first_ = reinterpret_cast<T*>(packet_shared_words + first_word);
     }
     PACKET_DEVICE T& operator[](std::uint32_t i) const { return first_[i]; }
+    PACKET_DEVICE void atomic_add(std::uint32_t i, T amount) const {
+        atomicAdd(first_ + i, amount);
+    }
+    PACKET_DEVICE void atomic_min(std::uint32_t i, T value) const { atomicMin(first_ + i, value); }
+    PACKET_DEVICE void atomic_max(std::uint32_t i, T value) const { atomicMax(first_ + i, value); }
 
 private:
     T* first_;

@@ -43,7 +43,7 @@ public:
         : scene_(scene), rays_(rays), options_(options), query_(query) {
         piece_ = std::min(piece_size(options.width), rays.size());
         if (options_.mode != DeviceMode::kAuto) return;
-        const bool coheres = choose_mode(rays, scene.world) == Mode::kTile;
+        const bool coheres = choose_mode(rays, scene.scene.bounds()) == Mode::kTile;
         options_.mode = coheres ? DeviceMode::kWarp : DeviceMode::kThread;
     }
 
@@ -109,7 +109,7 @@ void trace_on_device(const DeviceScene::Impl& scene, DeviceRays& rays, std::uint
     batch.next_slot = rays.next_slot.data();
     batch.work = rays.work.data();
     if (options.mode == DeviceMode::kSorted) {
-        rays.order = sort_rays(batch.rays, count, scene.world, stream);
+        rays.order = sort_rays(batch.rays, count, scene.scene.bounds(), stream);
         batch.order = rays.order.data();
         batch.width = 0;
     }
@@ -132,11 +132,13 @@ std::string device_name() {
     return properties.name;
 }
 
-DeviceScene::Impl::Impl(const SceneAccel& accel) : scene(accel), world(accel.top.bounds) {}
-
 DeviceScene::DeviceScene(const Scene& scene) {
     (void)device_name();  // throws if there is none
-    impl_ = std::make_unique<Impl>(scene.accel());
+    impl_ = std::make_unique<Impl>(UploadedScene(scene.accel()));
+}
+DeviceScene::DeviceScene(const Scene& scene, const BuildOptions& options) {
+    (void)device_name();  // throws if there is none
+    impl_ = std::make_unique<Impl>(UploadedScene(scene, options));
 }
 DeviceScene::~DeviceScene() = default;
 DeviceScene::DeviceScene(DeviceScene&&) noexcept = default;

@@ -10,10 +10,9 @@
 namespace packet::cuda {
 
 struct DeviceScene::Impl {
-    UploadedScene scene;
-    Bounds3f world;
+    explicit Impl(UploadedScene uploaded) : scene(std::move(uploaded)) {}
 
-    explicit Impl(const SceneAccel& accel);
+    UploadedScene scene;
 };
 
 /// Rays in device memory, and room for what they hit.

@@ -5,6 +5,7 @@
 
 #include <packet/error.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -68,6 +69,21 @@ public:
     [[nodiscard]] T* data() const noexcept { return data_; }
     [[nodiscard]] std::size_t size() const noexcept { return count_; }
 
+    /// At least so many, all of unknown value if there were fewer.
+    void make_room(std::size_t count) {
+        if (count <= count_) return;
+        *this = DeviceArray();  // given back first: both need not fit
+        *this = DeviceArray(count);
+    }
+    /// At least so many, of which the first `kept` stay. Room doubles, since it is asked for often.
+    void grow(std::size_t count, std::size_t kept, const Stream& stream) {
+        if (count <= count_) return;
+        DeviceArray larger(std::max(count, 2 * count_));
+        larger.copy_on_device(data_, kept, stream.get());
+        stream.synchronize();  // before the old memory is given back
+        *this = std::move(larger);
+    }
+
     // These are done in the stream's order; what is on the host must stay until then.
     void copy_from(std::span<const T> values, cudaStream_t stream) {
         if (values.empty()) return;
@@ -80,6 +96,22 @@ public:
         check(cudaMemcpyAsync(values.data(), data_, values.size_bytes(), cudaMemcpyDeviceToHost,
                               stream),
               "copy from the device");
+    }
+    void copy_on_device(const T* values, std::size_t count, cudaStream_t stream) {
+        if (count == 0) return;
+        check(cudaMemcpyAsync(data_, values, count * sizeof(T), cudaMemcpyDeviceToDevice, stream),
+              "copy on the device");
+    }
+    void copy_value(std::size_t index, T* to, cudaStream_t stream) const {
+        check(cudaMemcpyAsync(to, data_ + index, sizeof(T), cudaMemcpyDeviceToHost, stream),
+              "copy from the device");
+    }
+    /// Waits for what is in the stream.
+    [[nodiscard]] T value(std::size_t index, const Stream& stream) const {
+        T out;
+        copy_value(index, &out, stream.get());
+        stream.synchronize();
+        return out;
     }
     void fill_bytes(int byte, cudaStream_t stream) {
         check(cudaMemsetAsync(data_, byte, count_ * sizeof(T), stream), "cudaMemset");

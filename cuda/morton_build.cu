@@ -8,65 +8,21 @@
 #include "build/bvh_morton.h"
 #include "build/radix_hierarchy.h"
 #include "core/morton.h"
-#include "device.h"
+#include "item_launch.h"
+#include "ordered_bounds.h"
 #include "radix_sort.h"
-
-#include <packet/cuda.h>
 
 namespace packet::cuda {
 
 namespace {
-
-constexpr unsigned kBlockThreads = 256;
-
-template <class... Parameters, class... Arguments>
-void for_each_item(std::size_t count, const Stream& stream, void (*kernel)(Parameters...),
-                   Arguments... arguments) {
-    const auto blocks = static_cast<unsigned>((count + kBlockThreads - 1) / kBlockThreads);
-    launch(kernel, {blocks, kBlockThreads, 0, stream.get()}, arguments...);
-    check(cudaGetLastError(), "launch of a kernel that builds");
-}
-
-/// Floats as integers of the same order, of which atomics find the least and the greatest.
-PACKET_DEVICE std::uint32_t to_ordered(float x) {
-    const unsigned bits = __float_as_uint(x);
-    return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
-}
-float from_ordered(std::uint32_t ordered) {
-    const bool positive = (ordered & 0x80000000u) != 0;
-    return std::bit_cast<float>(positive ? ordered & 0x7FFFFFFFu : ~ordered);
-}
-
-struct OrderedBounds {
-    std::uint32_t lower[3], upper[3];
-};
-
-/// A warp's least or greatest in all its lanes, then one atomic for all of them.
-PACKET_DEVICE void reduce_min(std::uint32_t* to, std::uint32_t value) {
-    for (int bit = 16; bit != 0; bit /= 2) {
-        const std::uint32_t other = __shfl_xor_sync(kFullWarp, value, bit);
-        value = other < value ? other : value;
-    }
-    if (lane_id() == 0) atomicMin(to, value);
-}
-PACKET_DEVICE void reduce_max(std::uint32_t* to, std::uint32_t value) {
-    for (int bit = 16; bit != 0; bit /= 2) {
-        const std::uint32_t other = __shfl_xor_sync(kFullWarp, value, bit);
-        value = other > value ? other : value;
-    }
-    if (lane_id() == 0) atomicMax(to, value);
-}
 
 /// The box of doubled centroids. Threads beyond the end repeat the last reference.
 __global__ void measure_centroids(const Reference* references, std::uint32_t count,
                                   OrderedBounds* out) {
     const unsigned i = thread_in_grid();
     const Reference& r = references[i < count ? i : count - 1];
-    const float centroid[3] = {r.lower.x + r.upper.x, r.lower.y + r.upper.y, r.lower.z + r.upper.z};
-    for (int a = 0; a < 3; ++a) {
-        reduce_min(&out->lower[a], to_ordered(centroid[a]));
-        reduce_max(&out->upper[a], to_ordered(centroid[a]));
-    }
+    const glm::vec3 centroid = r.lower + r.upper;
+    extend_by_warp(*out, OrderedBounds::from({centroid, centroid}));
 }
 
 template <class Code>
@@ -122,45 +78,30 @@ __global__ void climb(const Reference* sorted, RadixHierarchy tree, LeafRule rul
 template <class Code>
 class Builder {
 public:
-    Builder(std::span<const Reference> references, const BuildOptions& options)
-        : count_(static_cast<std::uint32_t>(references.size())),
+    Builder(DeviceArray<Reference> references, std::uint32_t count, const BuildOptions& options)
+        : count_(count),
           rule_(options),
-          unsorted_(references),
+          unsorted_(std::move(references)),
           sorted_(count_),
-          nodes_(2 * references.size() - 1),
-          parents_(2 * references.size() - 1),
+          nodes_(2 * std::size_t{count} - 1),
+          parents_(2 * std::size_t{count} - 1),
           subtrees_(count_ - 1) {}
 
-    Hierarchy build() {
+    DeviceHierarchy build() {
         sort();
         build_nodes(0);
-        if (root_height() > kMaxDepth) {
+        if (subtrees_.value(0, stream_).height > kMaxDepth) {
             build_nodes(dropped_bits_for_depth(kMortonBits<Code>, count_));
         }
-        Hierarchy out;
-        out.nodes.resize(nodes_.size());
-        ScratchVector<Reference> sorted(count_);
-        nodes_.copy_to(out.nodes, stream_.get());
-        sorted_.copy_to(sorted, stream_.get());
-        stream_.synchronize();
-        out.ids = ids_of(sorted, Parallel(1));
-        return out;
+        return {std::move(nodes_), std::move(sorted_), 2 * count_ - 1, count_};
     }
 
 private:
     [[nodiscard]] MortonGrid<Code> measure() {
-        OrderedBounds ordered;
-        for (int a = 0; a < 3; ++a) ordered.lower[a] = 0xFFFFFFFFu, ordered.upper[a] = 0;
-        DeviceArray<OrderedBounds> result(std::span<const OrderedBounds>(&ordered, 1));
+        const OrderedBounds nothing = OrderedBounds::empty();
+        DeviceArray<OrderedBounds> result(std::span<const OrderedBounds>(&nothing, 1));
         for_each_item(count_, stream_, measure_centroids, unsorted_.data(), count_, result.data());
-        result.copy_to({&ordered, 1}, stream_.get());
-        stream_.synchronize();
-        Bounds3f bounds;
-        for (int a = 0; a < 3; ++a) {
-            bounds.lower[a] = from_ordered(ordered.lower[a]);
-            bounds.upper[a] = from_ordered(ordered.upper[a]);
-        }
-        return MortonGrid<Code>(bounds);
+        return MortonGrid<Code>(result.value(0, stream_).bounds());
     }
 
     void sort() {
@@ -185,15 +126,6 @@ private:
         stream_.synchronize();
     }
 
-    [[nodiscard]] int root_height() const {
-        RadixSubtree root;
-        check(cudaMemcpyAsync(&root, subtrees_.data(), sizeof(root), cudaMemcpyDeviceToHost,
-                              stream_.get()),
-              "copy from the device");
-        stream_.synchronize();
-        return root.height;
-    }
-
     Stream stream_;
     std::uint32_t count_;
     LeafRule rule_;
@@ -206,16 +138,22 @@ private:
 
 }  // namespace
 
-Hierarchy build_bvh_morton(std::span<const Reference> references, const BuildOptions& options) {
-    (void)device_name();  // throws if there is none
-    if (references.size() < 2) {
-        return packet::build_bvh_morton({references.begin(), references.end()}, options,
-                                        Parallel(1));
+/// The tree over one reference, or none.
+static DeviceHierarchy build_trivial(DeviceArray<Reference> references, std::uint32_t count) {
+    if (count == 0) return {};
+    const Stream stream;
+    const BuildNode leaf{references.value(0, stream).bounds(), 0, 0, 1};
+    return {DeviceArray<BuildNode>(std::span<const BuildNode>(&leaf, 1)), std::move(references), 1,
+            1};
+}
+
+DeviceHierarchy build_bvh_morton(DeviceArray<Reference> references, std::uint32_t count,
+                                 const BuildOptions& options) {
+    if (count < 2) return build_trivial(std::move(references), count);
+    if (chosen_morton_bits(count, options) == 30) {
+        return Builder<std::uint32_t>(std::move(references), count, options).build();
     }
-    if (chosen_morton_bits(references.size(), options) == 30) {
-        return Builder<std::uint32_t>(references, options).build();
-    }
-    return Builder<std::uint64_t>(references, options).build();
+    return Builder<std::uint64_t>(std::move(references), count, options).build();
 }
 
 }  // namespace packet::cuda

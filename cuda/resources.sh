@@ -33,7 +33,8 @@ echo "| GPU | kernel | registers | stack, bytes | spilled, bytes | warps by regi
 echo "|---|---|---|---|---|---|"
 failed=0
 for arch in sm_75 sm_90; do
-    for source in trace_kernels.cu ray_sort.cu morton_build.cu; do
+    for source in trace_kernels.cu ray_sort.cu device_references.cu morton_build.cu kd_planes.cu \
+        kd_step.cu kd_build.cu kd_numbering.cu lay_out.cu; do
         "$nvcc" "${flags[@]}" -arch=$arch $source 2>&1 | table || failed=1
     done
 done

@@ -14,6 +14,7 @@ struct DeviceScene::Impl {};
 std::string device_name() { throw_unavailable(); }
 
 DeviceScene::DeviceScene(const Scene&) { throw_unavailable(); }
+DeviceScene::DeviceScene(const Scene&, const BuildOptions&) { throw_unavailable(); }
 DeviceScene::~DeviceScene() = default;
 DeviceScene::DeviceScene(DeviceScene&&) noexcept = default;
 DeviceScene& DeviceScene::operator=(DeviceScene&&) noexcept = default;

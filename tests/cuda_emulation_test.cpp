@@ -121,6 +121,50 @@ TEST_CASE("a missing __syncwarp is found, in whatever order the lanes run") {
         "read after thread 0 without a barrier");
 }
 
+TEST_CASE("atomics in shared memory do not race with each other, but with all else") {
+    const auto start = [](const SharedArray<unsigned>& slots) {
+        if (threadIdx.x == 0) slots[0] = 0;
+    };
+    std::vector<unsigned> sums(64);
+    const auto count = [&] {
+        const SharedArray<unsigned> slots(0, 1);
+        start(slots);
+        __syncthreads();
+        slots.atomic_add(0, threadIdx.x);
+        __syncthreads();
+        sums[threadIdx.x] = slots[0];
+    };
+    CHECK(faults_of(count, 64).empty());
+    for (const unsigned sum : sums) CHECK(sum == 64 * 63 / 2);
+    check_found(
+        [&] {
+            const SharedArray<unsigned> slots(0, 1);
+            start(slots);
+            slots.atomic_add(0, 1u);
+        },
+        "atomic");
+    check_found(
+        [&] {
+            const SharedArray<unsigned> slots(0, 1);
+            start(slots);
+            __syncthreads();
+            slots.atomic_add(0, 1u);
+            (void)static_cast<unsigned>(slots[0]);
+        },
+        "without a barrier", 64);
+    check_found(
+        [&] {
+            const SharedArray<unsigned> slots(0, 1);
+            start(slots);
+            __syncthreads();
+            slots.atomic_add(0, 1u);
+            if (threadIdx.x == 5) slots[0] = 7;
+        },
+        "without a barrier");
+    check_found([&] { SharedArray<unsigned>(0, 4).atomic_add(0, 1u); }, "never written");
+    check_found([&] { SharedArray<unsigned>(0, 4).atomic_add(4 + lane_id(), 1u); }, "of 4");
+}
+
 TEST_CASE("wrong masks are found") {
     check_found([] { __ballot_sync(0x0000FFFFu, 1); }, "leaves out the lane that calls it");
     check_found(

@@ -4,6 +4,7 @@
 #include "cuda_device.h"
 #include "generate.h"
 #include "test_rays.h"
+#include "walkable.h"
 
 #include <doctest/doctest.h>
 
@@ -84,6 +85,40 @@ TEST_CASE("a scene of instances, some of one mesh") {
     check_device(scene, random_rays(scene.bounds(), 1000, 29), "instances");
 }
 
+TEST_CASE("a scene that is built on the device") {
+    if (!has_device()) return;
+    Scene scene;
+    const std::uint32_t city = scene.add_mesh(tools::make_city(800, 3));
+    const std::uint32_t soup = scene.add_mesh(tools::make_soup(60, 5));
+    const std::uint32_t empty = scene.add_mesh({});
+    for (const std::uint32_t mesh : {city, soup, empty, soup}) {
+        glm::mat4x3 placed(1.0f + 0.3f * static_cast<float>(mesh));
+        placed[3] = glm::vec3(0.7f * static_cast<float>(scene.instances().size()));
+        scene.add_instance(mesh, placed);
+    }
+    const std::vector<Ray> rays = random_rays(scene.bounds(), 500, 31);
+    Scene committed = scene;
+    committed.commit();
+    std::vector<Hit> want(rays.size());
+    trace_closest(committed, rays, want);
+    for (const AccelKind kind : {AccelKind::kBvhMorton, AccelKind::kKdSah}) {
+        BuildOptions options;
+        options.accel = kind;
+        options.keep_binary_nodes = false;  // which is about what the CPU keeps
+        INFO(to_string(kind));
+        const DeviceScene device(scene, options);
+        for (const DeviceMode mode : kModes) check_mode(device, rays, want, {mode, 0, nullptr});
+    }
+    for (const AccelKind kind : {AccelKind::kBvh, AccelKind::kGrid}) {
+        BuildOptions options;
+        options.accel = kind;
+        CHECK_THROWS_WITH((DeviceScene{scene, options}),
+                          ("CUDA devices build bvh-morton and breadth-first kd-sah, not " +
+                           std::string(to_string(kind)))
+                              .c_str());
+    }
+}
+
 TEST_CASE("rays at features, rays without sense, no rays, no triangles") {
     if (!has_device()) return;
     const TriangleMesh grid =
@@ -130,6 +165,22 @@ TEST_CASE("work is counted as the CPU counts it") {
     }
 }
 
+TEST_CASE("what is not walked on devices is refused by name") {
+    const Node node = {};
+    const GridBrick brick = {};
+    TreeView tree;
+    CHECK_NOTHROW(cuda::require_walkable(tree, 0));  // empty
+    tree.node_count = 1;
+    CHECK_THROWS_WITH(cuda::require_walkable(tree, 3),
+                      "mesh 3 has no binary nodes, which CUDA devices walk: build with "
+                      "BuildOptions::keep_binary_nodes");
+    tree.nodes = &node;
+    CHECK_NOTHROW(cuda::require_walkable(tree, 3));
+    tree.grid.bricks = &brick;
+    CHECK_THROWS_WITH(cuda::require_walkable(tree, 4),
+                      "mesh 4 is in a grid, which CUDA devices do not walk: choose a tree");
+}
+
 TEST_CASE("errors of the device's interface") {
     if (!has_device()) return;
     Scene scene = make_scene(tools::make_sphere(32));
@@ -146,6 +197,12 @@ TEST_CASE("errors of the device's interface") {
     scene.commit(options);
     CHECK_THROWS_WITH(DeviceScene{scene},
                       "mesh 0 is in a grid, which CUDA devices do not walk: choose a tree");
+    options = {};
+    options.keep_binary_nodes = false;
+    scene.commit(options);
+    CHECK_THROWS_WITH(DeviceScene{scene},
+                      "mesh 0 has no binary nodes, which CUDA devices walk: build with "
+                      "BuildOptions::keep_binary_nodes");
     CHECK_THROWS_WITH((void)cuda::parse_device_mode("warps"),
                       "unknown device mode 'warps'; valid are: auto, warp, thread, sorted");
 }

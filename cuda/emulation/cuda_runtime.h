@@ -50,10 +50,21 @@ inline int __all_sync(unsigned mask, int vote) {
 template <class T>
 T __shfl_sync(unsigned mask, T value, int lane) {
     using namespace packet::emulation;
-    static_assert(sizeof(T) == 4);
     const auto source = static_cast<unsigned>(lane) % 32;
-    return std::bit_cast<T>(static_cast<std::uint32_t>(
-        meet(Operation::kShuffle, mask, std::bit_cast<std::uint32_t>(value), source)));
+    if constexpr (sizeof(T) == 8) {
+        return std::bit_cast<T>(
+            meet(Operation::kShuffle, mask, std::bit_cast<std::uint64_t>(value), source));
+    } else {
+        static_assert(sizeof(T) == 4);
+        return std::bit_cast<T>(static_cast<std::uint32_t>(
+            meet(Operation::kShuffle, mask, std::bit_cast<std::uint32_t>(value), source)));
+    }
+}
+/// That of the lane so many below; a lane's own where there is none.
+template <class T>
+T __shfl_up_sync(unsigned mask, T value, unsigned lanes) {
+    const unsigned lane = threadIdx.x % 32;
+    return __shfl_sync(mask, value, static_cast<int>(lane < lanes ? lane : lane - lanes));
 }
 template <class T>
 T __shfl_xor_sync(unsigned mask, T value, int bits) {
@@ -95,11 +106,21 @@ T atomicExch(T* to, T value) {
     return old;
 }
 
+template <class T>
+T atomicOr(T* to, T bits) {
+    packet::emulation::yield();
+    const T old = *to;
+    *to = old | bits;
+    return old;
+}
+
+inline int __clz(int x) { return std::countl_zero(static_cast<unsigned>(x)); }
 inline int __popc(unsigned x) { return std::popcount(x); }
 inline int __ffs(int x) { return __builtin_ffs(x); }
 inline float __fmaf_rn(float a, float b, float c) { return std::fma(a, b, c); }
 inline int __float_as_int(float x) { return std::bit_cast<int>(x); }
 inline unsigned __float_as_uint(float x) { return std::bit_cast<unsigned>(x); }
+inline float __uint_as_float(unsigned x) { return std::bit_cast<float>(x); }
 inline float __int_as_float(int x) { return std::bit_cast<float>(x); }
 template <class T>
 T __ldg(const T* from) {
@@ -109,7 +130,7 @@ T __ldg(const T* from) {
 // ---- The runtime, of one device that does everything at once ----
 
 enum cudaError_t { cudaSuccess = 0, cudaErrorMemoryAllocation = 2 };
-enum cudaMemcpyKind { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost };
+enum cudaMemcpyKind { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost, cudaMemcpyDeviceToDevice };
 enum cudaFuncAttribute { cudaFuncAttributeMaxDynamicSharedMemorySize };
 enum cudaDeviceAttr { cudaDevAttrMultiProcessorCount, cudaDevAttrMaxSharedMemoryPerBlockOptin };
 using cudaStream_t = struct packet_emulated_stream*;

@@ -319,6 +319,17 @@ void write_shared(std::size_t word, std::uint32_t value) {
     shared.word(word) = value;
 }
 
+void change_shared(std::size_t word, std::uint32_t (*combine)(std::uint32_t, std::uint32_t),
+                   std::uint32_t value) {
+    yield();
+    const Thread& self = *machine().running;
+    SharedMemory& shared = self.block->shared;
+    if (word >= shared.word_count()) fail_bounds("shared memory", word, shared.word_count());
+    const std::string fault = shared.note_atomic(word, self.index);
+    if (!fault.empty()) fail(fault);
+    shared.word(word) = combine(shared.word(word), value);
+}
+
 void fail_bounds(const char* what, std::size_t index, std::size_t count) {
     fail(std::string(what) + ": index " + std::to_string(index) + " of " + std::to_string(count));
 }

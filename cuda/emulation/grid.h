@@ -53,6 +53,9 @@ void yield();
 /// A word of the block's dynamic shared memory.
 std::uint32_t read_shared(std::size_t word);
 void write_shared(std::size_t word, std::uint32_t value);
+/// Makes it combine(what it was, value), at once.
+void change_shared(std::size_t word, std::uint32_t (*combine)(std::uint32_t, std::uint32_t),
+                   std::uint32_t value);
 /// Ends the launch: the thread used index `index` of an array of `count`.
 [[noreturn]] void fail_bounds(const char* what, std::size_t index, std::size_t count);
 

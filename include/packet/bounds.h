@@ -13,7 +13,7 @@ struct Bounds3f {
     glm::vec3 lower{std::numeric_limits<float>::infinity()};
     glm::vec3 upper{-std::numeric_limits<float>::infinity()};
 
-    void extend(const glm::vec3& point) noexcept {
+    constexpr void extend(const glm::vec3& point) noexcept {
         lower = glm::min(lower, point);
         upper = glm::max(upper, point);
     }

@@ -43,14 +43,23 @@ struct DeviceTraceOptions {
 /// there is none: no device, no driver, or a library that was built without CUDA.
 [[nodiscard]] std::string device_name();
 
-/// A committed scene in the memory of the current device. It does not change with the scene that it
+/// A scene in the memory of the current device. It does not change with the scene that it
 /// was made of, which may go. Rays may be traced from several threads at once.
 class DeviceScene {
 public:
     /// Copies the scene's structures: per triangle 48 bytes, per node 32. Throws
     /// Error{kNotCommitted}, Error{kUnsupported} as device_name() does, if the device's memory does
-    /// not suffice, and for grids, which only the CPU walks.
+    /// not suffice, for grids, which only the CPU walks, and for scenes committed without
+    /// BuildOptions::keep_binary_nodes.
     explicit DeviceScene(const Scene& scene);
+    /// Builds the structures on the device, of a scene that need not be committed: only meshes and
+    /// instances travel there. `options.accel` is kBvhMorton (also kBvh of quality kFast) or
+    /// kKdSah, breadth-first; the tree is the CPU's, node for node. `progress` is not told. Takes,
+    /// while it builds, per reference about 150 bytes for the first and 350 for the second. Throws
+    /// as above, Error{kUnsupported} for any other structure, Error{kBadValue} for options as
+    /// commit() does, and Error{kTooLarge} where references that cuts may add come to more than
+    /// 2^29.
+    DeviceScene(const Scene& scene, const BuildOptions& options);
     ~DeviceScene();
     DeviceScene(DeviceScene&&) noexcept;
     DeviceScene& operator=(DeviceScene&&) noexcept;

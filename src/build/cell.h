@@ -34,21 +34,27 @@ struct Cell {
     }
 };
 
-/// Fills in a cell that holds everything: cuts may make its references
-/// options.max_reference_factor times as many, up to `most`.
+/// How many references cuts may add to so many: they may make them options.max_reference_factor
+/// times as many, up to `most`.
+[[nodiscard]] inline std::size_t spare_of_root(std::size_t count, const BuildOptions& options,
+                                               std::size_t most) {
+    const double allowed =
+        std::min(static_cast<double>(count) * static_cast<double>(options.max_reference_factor),
+                 static_cast<double>(most));
+    return static_cast<std::size_t>(allowed) - count;
+}
+
+/// Fills in a cell that holds everything.
 inline void fill_root(Cell& root, ScratchVector<Reference> references, const BuildOptions& options,
                       std::size_t most) {
-    const double allowed = std::min(
-        static_cast<double>(references.size()) * static_cast<double>(options.max_reference_factor),
-        static_cast<double>(most));
-    root.spare = static_cast<std::size_t>(allowed) - references.size();
+    root.spare = spare_of_root(references.size(), options, most);
     for (const Reference& r : references) root.bounds.extend(r.bounds());
     root.references = std::move(references);
 }
 
 /// Whether the parts of a cell have no more references together than they may.
 template <class Child, class Parent>
-[[nodiscard]] bool is_within_spare(const Parent& cell, std::span<const Child> children) {
+[[nodiscard]] constexpr bool is_within_spare(const Parent& cell, std::span<const Child> children) {
     std::size_t count = 0;
     for (const Child& child : children) count += child.reference_count();
     return count <= cell.reference_count() + cell.spare;
@@ -57,7 +63,7 @@ template <class Child, class Parent>
 /// Work, and the references that the cut has not used up, are shared in proportion to the parts'
 /// references.
 template <class Child, class Parent>
-void share_out(const Parent& cell, std::span<Child> children) {
+constexpr void share_out(const Parent& cell, std::span<Child> children) {
     PACKET_ASSERT(is_within_spare<Child>(cell, children));
     std::size_t count = 0;
     for (const Child& child : children) count += child.reference_count();

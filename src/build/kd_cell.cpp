@@ -9,24 +9,6 @@
 
 namespace packet {
 
-KdCost::KdCost(const Bounds3f& cell, std::size_t reference_count,
-               const BuildOptions& options) noexcept {
-    double extent[3];
-    for (int a = 0; a < 3; ++a) {
-        lower_[a] = static_cast<double>(cell.lower[a]);
-        upper_[a] = static_cast<double>(cell.upper[a]);
-        extent[a] = upper_[a] - lower_[a];
-    }
-    for (int a = 0; a < 3; ++a) {
-        section_[a] = extent[(a + 1) % 3] * extent[(a + 2) % 3];
-        rim_[a] = extent[(a + 1) % 3] + extent[(a + 2) % 3];
-    }
-    const double whole = area(0, extent[0]);
-    intersection_ = static_cast<double>(options.intersection_cost);
-    traversal_ = static_cast<double>(options.traversal_cost) * whole;
-    leaf_ = intersection_ * whole * static_cast<double>(reference_count);
-}
-
 // References: about a millisecond of work.
 static constexpr std::size_t kCheckInterval = 65536;
 
@@ -80,10 +62,7 @@ int max_cut_depth(std::size_t reference_count) noexcept {
 
 std::vector<std::uint8_t> sides_of_halves(std::span<const Reference> references,
                                           const Bounds3f& bounds) {
-    const glm::vec3 extent = bounds.extent();
-    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
-                     : extent.y >= extent.z                       ? 1
-                                                                  : 2;
+    const int axis = widest_axis(bounds);
     const auto centroid2 = [&](std::uint32_t i) {
         return references[i].lower[axis] + references[i].upper[axis];
     };

@@ -3,8 +3,7 @@
 #pragma once
 
 #include "build/cell.h"
-
-#include <packet/accel.h>
+#include "build/kd_plane.h"
 
 #include <array>
 #include <cstdint>
@@ -20,66 +19,6 @@ using EventLists = std::array<EventList, 3>;
 
 struct KdCell : Cell {
     EventLists events;  ///< kd-sah only
-};
-
-/// Two sides have references; one that reaches to both is cut and counts on both.
-inline constexpr int kBothSides = 2;
-
-struct KdPlane {
-    double cost = 0.0;
-    float position = 0.0f;
-    int axis = -1;      ///< -1: no cut
-    int flat_side = 0;  ///< where references go that lie in the plane
-
-    [[nodiscard]] bool is_cut() const noexcept { return axis >= 0; }
-    [[nodiscard]] int side_of(const Reference& r) const noexcept {
-        if (r.lower[axis] == position && r.upper[axis] == position) return flat_side;
-        if (r.upper[axis] <= position) return 0;
-        return r.lower[axis] >= position ? 1 : kBothSides;
-    }
-};
-
-struct KdCounts {
-    std::size_t side[2] = {0, 0};
-
-    /// A cut must leave something on both sides and not add more references than the cell may.
-    template <class AnyCell>
-    [[nodiscard]] bool allow_cut(const AnyCell& cell) const noexcept {
-        return side[0] != 0 && side[1] != 0 &&
-               side[0] + side[1] <= cell.reference_count() + cell.spare;
-    }
-};
-
-/// The surface area heuristic for one cell. All costs have the cell's area as a factor, so that
-/// flat cells need no division.
-class KdCost {
-public:
-    KdCost(const Bounds3f& cell, std::size_t reference_count, const BuildOptions& options) noexcept;
-    template <class AnyCell>
-    KdCost(const AnyCell& cell, const BuildOptions& options) noexcept
-        : KdCost(cell.bounds, cell.reference_count(), options) {}
-
-    [[nodiscard]] double leaf() const noexcept { return leaf_; }
-    /// One side ends at `end` and the other begins at `begin`, at most what lies between is empty.
-    [[nodiscard]] double cut(int axis, float end, float begin,
-                             const KdCounts& counts) const noexcept {
-        const double below = static_cast<double>(end) - lower_[axis];
-        const double above = upper_[axis] - static_cast<double>(begin);
-        return traversal_ +
-               intersection_ * (static_cast<double>(counts.side[0]) * area(axis, below) +
-                                static_cast<double>(counts.side[1]) * area(axis, above));
-    }
-
-private:
-    /// Half the surface of a slice of the cell.
-    [[nodiscard]] double area(int axis, double length) const noexcept {
-        return section_[axis] + length * rim_[axis];
-    }
-
-    double lower_[3], upper_[3];
-    double section_[3];  ///< area of the cell's cross section
-    double rim_[3];      ///< half the section's circumference
-    double intersection_, traversal_, leaf_;
 };
 
 /// No cell is cut that is this deep in a tree over so many references. Wald and Havran: deeper cuts

@@ -95,12 +95,10 @@ struct Group {
 };
 
 /// Moves a plane along the axis past all events and keeps the cheapest place.
-void sweep(const KdCell& cell, int axis, const KdCost& cost, KdPlane& best) {
+void sweep(const KdCell& cell, int axis, KdSearch<KdCell>& search) {
     const EventList& events = cell.events[static_cast<std::size_t>(axis)];
     const auto consider = [&](float end, float begin, const KdCounts& counts, int flat_side) {
-        if (!counts.allow_cut(cell)) return;
-        const double c = cost.cut(axis, end, begin, counts);
-        if (c < best.cost) best = {c, end, axis, flat_side};
+        search.consider(axis, end, end, begin, counts, flat_side);
     };
     std::size_t below = 0, above = cell.references.size();
     for (std::size_t i = 0; i < events.size();) {
@@ -156,9 +154,9 @@ KdPlane find_cheapest_plane(const KdCell& cell, const BuildOptions& options,
     const KdCost cost(cell, options);
     std::array<KdPlane, 3> planes;
     for_axes(cell.references.size(), parallel, [&](int a) {
-        KdPlane& plane = planes[static_cast<std::size_t>(a)];
-        plane.cost = cost.leaf();
-        sweep(cell, a, cost, plane);
+        KdSearch<KdCell> search(cell, cost);
+        sweep(cell, a, search);
+        planes[static_cast<std::size_t>(a)] = search.best;
     });
     return *std::min_element(planes.begin(), planes.end(),
                              [](const KdPlane& a, const KdPlane& b) { return a.cost < b.cost; });

@@ -9,13 +9,18 @@ namespace packet {
 // Of the time that both stages take, about.
 static constexpr double kShareOfLarge = 0.35;
 
-/// A level of one cell that holds everything.
+/// The only cell of the first level: it holds everything.
 static KdLevel make_root(ScratchVector<Reference> references, const BuildOptions& options) {
     Cell root;
     fill_root(root, std::move(references), options, kMaxReferences);
     KdLevel level;
-    level.references.assign(root.references.begin(), root.references.end());
-    level.cells.push_back({root.bounds, 0, root.references.size(), root.spare});
+    level.references.reserve(root.references.size());
+    for (const Reference& r : root.references) {
+        const Bounds3f box = without_negative_zero(r.bounds());
+        level.references.push_back({box.lower, r.id, box.upper});
+    }
+    level.cells.push_back(
+        {without_negative_zero(root.bounds), 0, root.references.size(), root.spare});
     return level;
 }
 

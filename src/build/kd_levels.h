@@ -13,6 +13,12 @@
 
 namespace packet {
 
+/// Boxes of the build have no -0, nor have parts that are cut of them, so that bounds are the same
+/// in whatever order boxes are joined.
+[[nodiscard]] constexpr Bounds3f without_negative_zero(const Bounds3f& box) noexcept {
+    return {box.lower + 0.0f, box.upper + 0.0f};
+}
+
 /// As build_kd_tree() by KdRule::kSah, of at most kMaxReferences references.
 [[nodiscard]] Hierarchy build_kd_levels(MeshView mesh, ScratchVector<Reference> references,
                                         const BuildOptions& options, const Parallel& parallel);

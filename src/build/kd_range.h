@@ -19,7 +19,7 @@ struct KdRange {
     int depth = 0;
     std::uint32_t node = 0;  ///< of the hierarchy, that it becomes
 
-    [[nodiscard]] std::size_t reference_count() const noexcept { return count; }
+    [[nodiscard]] constexpr std::size_t reference_count() const noexcept { return count; }
 };
 
 struct KdLevel {

@@ -1,6 +1,7 @@
 #include "build/kd_small_stage.h"
 
 #include "build/clip.h"
+#include "build/kd_cell.h"
 #include "build/kd_masks.h"
 #include "build/split.h"
 #include "core/macros.h"
@@ -184,7 +185,7 @@ void emit(Task& task, Hierarchy& out) {
         const BuildNode& node = nodes[i] = task.nodes[i];
         const std::size_t base = node.is_leaf() ? task.first_reference : task.first_node;
         nodes[i].first += static_cast<std::uint32_t>(base);
-        nodes[i].second += static_cast<std::uint32_t>(task.first_node);
+        if (!node.is_leaf()) nodes[i].second += static_cast<std::uint32_t>(task.first_node);
     }
     const std::span<const KdRange> cells = task.cells();
     for (std::size_t i = 0; i < cells.size(); ++i) out.nodes[cells[i].node] = nodes[task.roots[i]];

@@ -5,6 +5,7 @@
 // Karras. Maximizing parallelism in the construction of BVHs, octrees, and k-d trees. HPG 2012.
 #pragma once
 
+#include "core/bits.h"
 #include "core/views.h"
 
 #include <algorithm>
@@ -34,12 +35,12 @@ struct RadixNode {
 /// `dropped_bits` are taken as equal, and then the bits of their position, which tell equal codes
 /// apart.
 template <class Code>
-[[nodiscard]] constexpr int common_bits(Code code_i, Code code_j, std::int64_t i, std::int64_t j,
-                                        int dropped_bits) noexcept {
+[[nodiscard]] PACKET_INLINE int common_bits(Code code_i, Code code_j, std::int64_t i,
+                                            std::int64_t j, int dropped_bits) noexcept {
     constexpr int kCodeBits = 8 * sizeof(Code);
     const Code difference = (code_i ^ code_j) >> dropped_bits;
-    if (difference != 0) return std::countl_zero(difference);
-    return kCodeBits + std::countl_zero(static_cast<std::uint32_t>(i ^ j));
+    if (difference != 0) return leading_zeros(difference);
+    return kCodeBits + leading_zeros(static_cast<std::uint32_t>(i ^ j));
 }
 
 /// Sorted keys.
@@ -107,8 +108,8 @@ template <class Keys>
     // The last one that has more in common with i than the end has is next to the split.
     const int within = keys.common_bits(i, end);
     std::int64_t same = 0;
-    for (std::int64_t step = std::bit_ceil(static_cast<std::uint64_t>(length)) / 2; step > 0;
-         step /= 2) {
+    const std::uint64_t steps = ceil_to_power_of_2(static_cast<std::uint64_t>(length));
+    for (auto step = static_cast<std::int64_t>(steps / 2); step > 0; step /= 2) {
         if (keys.common_bits(i, i + (same + step) * d) > within) same += step;
     }
     const std::int64_t split = i + same * d + std::min<std::int64_t>(d, 0);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "build/hierarchy.h"
+#include "core/bits.h"
 #include "core/views.h"
 
 #include <algorithm>
@@ -66,8 +67,8 @@ template <class Result, class FoldPiece, class Join>
 
 /// A split is allowed if the larger child can still be halved down to one reference within
 /// kMaxDepth. Halving keeps the condition, so by induction no leaf is deeper than that.
-[[nodiscard]] inline bool fits_depth(int child_depth, std::size_t larger_child) noexcept {
-    return child_depth + static_cast<int>(std::bit_width(larger_child - 1)) <= kMaxDepth;
+[[nodiscard]] PACKET_INLINE bool fits_depth(int child_depth, std::size_t larger_child) noexcept {
+    return child_depth + 64 - leading_zeros(std::uint64_t{larger_child} - 1) <= kMaxDepth;
 }
 
 /// Whether `first` of `count` references at `depth` may go to one side and the others to the other:

@@ -70,24 +70,24 @@ struct TransformError {
     }
 };
 
-/// The tree over the instances that show anything. The meshes' trees are built.
-void build_top(std::span<const Instance> instances, const BuildOptions& options,
-               const Parallel& parallel, SceneAccel& out) {
+}  // namespace
+
+void build_top(std::span<const Instance> instances, std::span<const Bounds3f> mesh_bounds,
+               const BuildOptions& options, const Parallel& parallel, SceneAccel& out) {
     ScratchVector<Reference> references;
     std::vector<InstanceView> views(instances.size());
     TransformError error;
     for (std::size_t i = 0; i < instances.size(); ++i) {
         const auto id = static_cast<std::uint32_t>(i);
         const Instance& instance = instances[i];
-        const Tree& tree = out.trees[instance.mesh_id];
         const std::string what = "transform of instance " + std::to_string(i);
         const ObjectFromWorld inverse = invert(instance.world_from_object, what.c_str());
         std::copy_n(&inverse.row[0][0], 12, &views[i].object_from_world[0][0]);
         views[i].instance_id = id;
-        views[i].tree = &out.tree_views[instance.mesh_id];
+        views[i].tree = nullptr;
         out.mesh_of_instance.push_back(instance.mesh_id);
-        const Bounds3f box = transform(instance.world_from_object, tree.bounds);
-        if (box.empty()) continue;
+        const Bounds3f box = transform(instance.world_from_object, mesh_bounds[instance.mesh_id]);
+        if (box.empty()) continue;  // it shows nothing
         error.extend(inverse, instance.world_from_object);
         references.push_back({box.lower, id, box.upper});
     }
@@ -96,11 +96,15 @@ void build_top(std::span<const Instance> instances, const BuildOptions& options,
     const Hierarchy hierarchy = build_bvh_sah(std::move(references), top_options, parallel);
     out.top = make_tree(hierarchy, top_options, parallel);
     for (const std::uint32_t id : hierarchy.ids) out.instances.push_back(views[id]);
-    out.view.top = out.top.view();
-    error.apply(out.view.top);
+    SceneView& view = out.view;
+    view.top = out.top.view();
+    error.apply(view.top);
+    view.instances = out.instances.data();
+    view.instance_count = static_cast<std::uint32_t>(out.instances.size());
+    view.mesh_of_instance = out.mesh_of_instance.data();
+    view.is_single_mesh = instances.size() == 1 && view.instance_count == 1 &&
+                          instances[0].world_from_object == glm::mat4x3(1.0f);
 }
-
-}  // namespace
 
 static std::shared_ptr<const SceneAccel> build_all(std::span<const TriangleMesh> meshes,
                                                    std::span<const Instance> instances,
@@ -113,15 +117,14 @@ static std::shared_ptr<const SceneAccel> build_all(std::span<const TriangleMesh>
     const double share_of_one = 1.0 / static_cast<double>(std::max<std::size_t>(work, 1));
     build_trees(meshes, options, progress, share_of_one, *out);
     progress.start_phase(share_of_one * static_cast<double>(instances.size()));
-    build_top(instances, options, Parallel(options.threads, progress), *out);
+    std::vector<Bounds3f> boxes;
+    for (const Tree& tree : out->trees) boxes.push_back(tree.bounds);
+    build_top(instances, boxes, options, Parallel(options.threads, progress), *out);
+    for (InstanceView& instance : out->instances) {
+        instance.tree = &out->tree_views[out->mesh_of_instance[instance.instance_id]];
+    }
     out->stats.bytes += out->top.stats.bytes + out->instances.size() * sizeof(InstanceView) +
                         out->mesh_of_instance.size() * sizeof(std::uint32_t);
-    SceneView& view = out->view;
-    view.instances = out->instances.data();
-    view.instance_count = static_cast<std::uint32_t>(out->instances.size());
-    view.mesh_of_instance = out->mesh_of_instance.data();
-    view.is_single_mesh = instances.size() == 1 && view.instance_count == 1 &&
-                          instances[0].world_from_object == glm::mat4x3(1.0f);
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     out->stats.seconds = elapsed.count();
     return out;

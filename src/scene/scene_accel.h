@@ -20,6 +20,11 @@ struct SceneAccel {
     SceneView view;
 };
 
+/// The tree over the instances, of meshes in these boxes, and all of the view. `tree` of the
+/// instances is null: it is for the caller to say where meshes' trees are.
+void build_top(std::span<const Instance> instances, std::span<const Bounds3f> mesh_bounds,
+               const BuildOptions& options, const Parallel& parallel, SceneAccel& out);
+
 /// Builds everything, or throws and leaves nothing behind.
 [[nodiscard]] std::shared_ptr<const SceneAccel> build_scene_accel(
     std::span<const TriangleMesh> meshes, std::span<const Instance> instances,
