@@ -64,7 +64,9 @@ void print_scores(std::string_view scene, std::size_t triangles, std::size_t byt
 /// Whether all of ours answered alike.
 bool measure(std::string_view kind, std::size_t triangles, const Options& options) {
     Scene scene = make_scene(tools::generate(kind, triangles));
-    scene.commit();
+    BuildOptions build;
+    build.treelet_bytes = kUsualTreeletBytes;
+    scene.commit(build);
     const TriangleMesh& mesh = scene.meshes()[0];
     const EmbreeScene embree(mesh.view());
     const std::vector<Contender> contenders = all_contenders(scene, embree);

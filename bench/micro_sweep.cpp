@@ -30,7 +30,9 @@ constexpr std::size_t kGroup = 128;
 
 Scene make_committed_city() {
     Scene scene = make_scene(tools::generate("city", 200'000));
-    scene.commit();
+    BuildOptions options;
+    options.treelet_bytes = kUsualTreeletBytes;
+    scene.commit(options);
     return scene;
 }
 

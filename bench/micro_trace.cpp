@@ -26,6 +26,7 @@ Course make_course(std::string_view scene_kind, std::size_t triangles, AccelKind
     Scene scene = make_scene(tools::generate(scene_kind, triangles));
     BuildOptions options;
     options.accel = accel;
+    options.treelet_bytes = kUsualTreeletBytes;
     scene.commit(options);
     tools::CameraOptions camera;
     camera.size = kImageSize;

@@ -3,6 +3,8 @@
 #include "build/kd_bins.h"
 #include "ordered_bounds.h"
 
+#include <algorithm>
+
 namespace packet::cuda {
 
 namespace {

@@ -7,6 +7,7 @@
 #include "build/triangle_clipper.h"
 #include "radix_sort.h"
 
+#include <algorithm>
 #include <bit>
 #include <utility>
 

@@ -255,6 +255,19 @@ TEST_CASE("trace reports one JSON object") {
     for (const std::string& key : stats) CHECK(report["stats"][key].is_number());
 }
 
+TEST_CASE("trees are cut into treelets for the mode that needs them, or as told") {
+    const ProgramWithScene program;
+    const auto stats = [&](const std::string& options) {
+        return json::parse(
+            program.output("trace scene.glb rays.npy --json --stats " + options))["stats"];
+    };
+    CHECK(stats("--mode treelet")["treelets"]["count"] == 1);
+    CHECK(stats("--mode treelet --treelet-bytes 5000")["treelets"]["count"] > 1);
+    CHECK(stats("--treelet-bytes 5000 --mode treelet")["treelets"]["count"] > 1);
+    CHECK(!stats("--mode treelet --treelet-bytes 0").contains("treelets"));
+    CHECK(!stats("--mode stream").contains("treelets"));
+}
+
 TEST_CASE("trace writes a record for each ray, in the rays' order") {
     const ProgramWithScene program;
     program.output("trace scene.glb rays.npy -o hits.npy --width 32");

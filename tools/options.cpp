@@ -112,7 +112,12 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
     // Before any work is done, and whichever of the two came first.
     app.parse_complete_callback([&] { (void)chosen_accel(options.build); });
     add_name_option(app, "--mode", "How rays are grouped", list_names(mode_names()),
-                    [&](std::string_view name) { options.trace.mode = parse_mode(name); })
+                    [&](std::string_view name) {
+                        options.trace.mode = parse_mode(name);
+                        // --treelet-bytes is defined after this and so has the last word.
+                        const bool needs_treelets = options.trace.mode == Mode::kTreelet;
+                        options.build.treelet_bytes = needs_treelets ? kUsualTreeletBytes : 0;
+                    })
         ->default_str("auto");
     add_name_option(app, "--isa", "Instruction set, without it the CPU's best", isa_names(),
                     [&](std::string_view name) { options.trace.isa = usable_isa(name); });
@@ -133,7 +138,7 @@ void add_treelet_options(CLI::App& app, CommonOptions& options) {
         ->default_str(std::string(kTreeletCuts[0].name));
     app.add_option("--treelet-bytes", options.build.treelet_bytes,
                    "Bytes of a treelet, at most; 0 for none")
-        ->capture_default_str();
+        ->default_str(fmt::format("{} with --mode treelet", kUsualTreeletBytes));
     app.add_option("--queue-bytes", options.trace.queue_bytes, "Bytes for rays that wait")
         ->capture_default_str();
     app.add_option("--queue-chunk", options.trace.queue_chunk, "Rays by which queues grow")

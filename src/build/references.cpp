@@ -2,6 +2,7 @@
 
 #include "scene/triangle_fault.h"
 
+#include <algorithm>
 #include <vector>
 
 namespace packet {

@@ -17,6 +17,18 @@ PACKET_INLINE int class_run(const float* const* dir, int most) {
     return count;
 }
 
+/// Fills a stream with the first `count` rays, which are of one class.
+template <class Isa>
+PACKET_INLINE void load_stream(StreamRays<Isa>& out, const TreeView& tree, const RayColumns& rays,
+                               int count, std::int32_t instance_id) {
+    out.active = 0;
+    for (int first = 0; first < count; first += kSingleLanes) {
+        const LoadedRays<kSingleLanes, Isa> loaded(rays.from(first),
+                                                   lanes_below<kSingleLanes>(count, first));
+        out.load(tree, loaded.ray, loaded.active.bits(), first, instance_id);
+    }
+}
+
 template <Query query, class Isa, class Stats>
 class StreamBatch {
 public:
@@ -42,12 +54,7 @@ public:
 
 private:
     PACKET_INLINE void trace_stream(const RayColumns& columns, std::size_t begin, int count) {
-        rays_.active = 0;
-        for (int first = 0; first < count; first += kSingleLanes) {
-            const LoadedRays<kSingleLanes, Isa> loaded(columns.from(first),
-                                                       lanes_below<kSingleLanes>(count, first));
-            rays_.load(tree_, loaded.ray, loaded.active.bits(), first, instance_id_);
-        }
+        load_stream(rays_, tree_, columns, count, instance_id_);
         walk_.run(rays_);
         for (int i = 0; i < count; ++i) store_hits(rays_.best[i], hits_, i);
         scatter_hits<query>(batch_, begin, count, hits_);

@@ -50,12 +50,7 @@ public:
 
 private:
     PACKET_INLINE void load(const RayColumns& columns, std::size_t begin, int count) {
-        rays_.active = 0;
-        for (int first = 0; first < count; first += kSingleLanes) {
-            const LoadedRays<kSingleLanes, Isa> loaded(columns.from(first),
-                                                       lanes_below<kSingleLanes>(count, first));
-            rays_.load(tree_, loaded.ray, loaded.active.bits(), first, instance_id_);
-        }
+        load_stream(rays_, tree_, columns, count, instance_id_);
         stats_.treelet_stream(count);
         for (int r = 0; r < count; ++r) {
             ray_[r] = batch_.rays.order[begin + static_cast<std::size_t>(r)];

@@ -4,6 +4,7 @@
 
 #include <oneapi/tbb/global_control.h>
 
+#include <algorithm>
 #include <string>
 
 namespace packet {

@@ -3,6 +3,7 @@
 #include <packet/error.h>
 #include <packet/trace.h>
 
+#include <algorithm>
 #include <mutex>
 #include <string>
 #include <vector>

@@ -1,0 +1,49 @@
+#include "schedule/ray_tasks.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace packet {
+
+std::size_t rays_per_stream_task(std::size_t rays, int threads) noexcept {
+    constexpr std::size_t kMost = 32768;
+    static_assert(kMost <= StreamOrder::kMostRays);
+    constexpr std::size_t kTasksPerThread = 8;
+    if (threads == 1) return kMost;
+    return std::clamp(rays / (kTasksPerThread * static_cast<std::size_t>(threads)),
+                      kLeastRaysForStreams, kMost);
+}
+
+RayTasks RayTasks::sorted(std::span<const Ray> rays, int threads) {
+    RayTasks out(rays, 0);
+    out.run_length_ = rays_per_stream_task(rays.size(), threads);
+    out.orders_ = std::make_unique<StreamOrders>();
+    return out;
+}
+
+std::size_t RayTasks::count() const {
+    return image_.is_image() ? image_.tile_count() : (rays_.size() + run_length_ - 1) / run_length_;
+}
+
+void RayTasks::run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
+    PixelOrder::Indices pixels;
+    std::unique_ptr<StreamOrder> sorted;
+    std::size_t first = task * run_length_;
+    batch.count = std::min(run_length_, rays_.size() - std::min(first, rays_.size()));
+    if (image_.is_image()) {
+        first = image_.first_ray(task);
+        batch.count = image_.fill(task, pixels);
+        batch.order = pixels.data();
+    } else if (orders_ != nullptr) {
+        sorted = orders_->take();
+        batch.order = sorted->sort(rays_.subspan(first, batch.count)).data();
+    }
+    batch.rays = rays_.data() + first;
+    if (batch.hits != nullptr) batch.hits += first;
+    if (batch.occluded != nullptr) batch.occluded += first;
+    if (batch.stats != nullptr) batch.stats->rays += batch.count;
+    kernel(batch);
+    if (sorted != nullptr) orders_->give_back(std::move(sorted));
+}
+
+}  // namespace packet

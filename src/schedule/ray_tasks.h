@@ -1,0 +1,44 @@
+// Rays cut into tasks: an image's into square tiles, others into runs.
+#pragma once
+
+#include "kernels/kernel_table.h"
+#include "schedule/pixel_order.h"
+#include "schedule/stream_order.h"
+
+#include <packet/ray.h>
+
+#include <cstddef>
+#include <memory>
+#include <span>
+
+namespace packet {
+
+// Fewer, of 24 classes, make streams of few rays: docs/benchmarking.md#streams.
+inline constexpr std::size_t kLeastRaysForStreams = 1024;
+
+/// Rays of a task of streams. The more are sorted together, the more come together at a node; but
+/// they are to stay in the second level's cache, and several threads are to have several tasks.
+[[nodiscard]] std::size_t rays_per_stream_task(std::size_t rays, int threads) noexcept;
+
+class RayTasks {
+public:
+    /// `width` rays to a line of an image, or 0.
+    RayTasks(std::span<const Ray> rays, int width) : rays_(rays), image_(rays.size(), width) {}
+    /// Runs that are sorted, as streams need them.
+    [[nodiscard]] static RayTasks sorted(std::span<const Ray> rays, int threads);
+
+    [[nodiscard]] std::size_t count() const;
+    /// Runs a kernel on the rays of a task. `batch` says where results go, for all rays.
+    void run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const;
+
+private:
+    // Some 100 us of work, so that tasks are cheap and cores end together.
+    static constexpr std::size_t kRaysPerTask = 512;
+
+    std::span<const Ray> rays_;
+    PixelOrder image_;
+    std::size_t run_length_ = kRaysPerTask;
+    std::unique_ptr<StreamOrders> orders_;  ///< if runs are sorted
+};
+
+}  // namespace packet
