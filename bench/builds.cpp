@@ -46,7 +46,6 @@ Builder our_builder(AccelKind accel, Rival rival) {
         Scene copy = scene;
         BuildOptions options;
         options.accel = accel;
-        options.keep_binary_nodes = false;  // which nothing on the CPU needs but the packet modes
         const double seconds = tools::seconds_of([&] { copy.commit(options); });
         return Built{seconds, copy.build_stats().bytes, copy.build_stats().sah_cost};
     };

@@ -29,7 +29,8 @@ struct Contest {
 
 /// Every contender's score on the rays, in the contenders' order; the first must be ours. After an
 /// untimed run of each, whose answers are compared, runs alternate, so that a machine that slows
-/// down or speeds up does so for all. `mesh` is what the scenes hold.
+/// down or speeds up does so for all; each follows an untimed one of the same contender, which
+/// fills the cache. `mesh` is what the scenes hold.
 [[nodiscard]] std::vector<Score> hold(const Contest& contest, MeshView mesh, const RaySet& set,
                                       std::span<const Contender> contenders);
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Counts the instructions of a node visit and of a triangle test, as the release build compiles them:
-# all, those on vectors, and wide stores to and reads from the stack. CXX picks the compiler.
+# Counts the instructions of a child's box test and of a triangle test, as the release build compiles
+# them: all, those on vectors, and wide stores to and reads from the stack. CXX picks the compiler.
 #
 #   bench/count_instructions.sh
 set -euo pipefail
@@ -20,7 +20,7 @@ count() {  # ISA, flags
             mixed = /Directions\)1/ ? "mixed" : "shared"
             lanes = /, 16, / ? 16 : 8
             name = ""
-            if (match($0, /::(visit_node|rays_meet_triangle|rays_hit_triangle|ray_meets_block)/))
+            if (match($0, /::(visit_child|rays_meet_triangle|rays_hit_triangle|ray_meets_block)/))
                 name = sprintf("%-8s%-20s%-8s%4d", isa, substr($0, RSTART + 2, RLENGTH - 2), mixed,
                                lanes)
             next

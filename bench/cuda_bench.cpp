@@ -64,7 +64,9 @@ void print_mode(const cuda::DeviceScene& device, std::span<const Ray> rays,
 
 void print_scene(const tools::SceneKind& kind, const Options& options) {
     Scene scene = make_scene(kind.make(options.triangles, 1));
-    scene.commit();
+    BuildOptions build;
+    build.keep_binary_nodes = true;  // which devices walk
+    scene.commit(build);
     tools::CameraOptions view;
     view.size = {options.side, options.side};
     const tools::Camera camera(view, scene.bounds());

@@ -1,15 +1,17 @@
 // The steps of a walk as functions of their own, for count_instructions.sh to look at. ISA names
 // the instruction set. No program holds this.
 #include "kernels/leaf.h"
-#include "kernels/packet_walk.h"
 
 namespace packet {
 
 template <Directions directions, int N, class Isa>
 struct Probe {
-    [[gnu::noinline]] static void visit_node(const PreparedRays<N, Isa>& ray, const Node& node,
-                                             const Float<N, Isa>& best_t, Float<N, Isa>& enter) {
-        enter = entry<directions>(ray, node, best_t);
+    [[gnu::noinline]] static void visit_child(const PreparedRays<N, Isa>& ray, const WideNode& node,
+                                              int child, const Float<N, Isa>& best_t,
+                                              Float<N, Isa>& enter) {
+        const BoxPlanes<directions, N, Isa> planes(node, child, ray.near_side);
+        const Interval<N, Isa> box = planes.slabs(ray);
+        enter = select(meets(ray, box, best_t), box.enter, Float<N, Isa>(__builtin_huge_valf()));
     }
     [[gnu::noinline]] static std::uint32_t rays_meet_triangle(const ShearRays<N, Isa>& ray,
                                                               const TriangleBlock& block,

@@ -25,11 +25,10 @@ constexpr std::size_t kRayCount = 64;
 
 struct StepData {
     std::vector<Ray> rays;
-    std::vector<Node> nodes;
     std::vector<WideNode> wide_nodes;
     std::vector<TriangleBlock> blocks;
 
-    StepData() : nodes(kBoxCount), wide_nodes(kBoxCount / kWideSize) {
+    StepData() : wide_nodes(kBoxCount / kWideSize) {
         tools::Random random(1);
         for (std::size_t i = 0; i < kRayCount; ++i) rays.push_back(make_ray(random));
         for (std::size_t i = 0; i < kBoxCount; ++i) set_box(i, random);
@@ -42,11 +41,9 @@ struct StepData {
 
     [[nodiscard]] StepInput input() const {
         StepInput in{};
-        in.tree.nodes = nodes.data();
         in.tree.wide_nodes = wide_nodes.data();
         in.tree.blocks = blocks.data();
         for (float& upper : in.tree.upper) upper = 1.0f;
-        in.node_count = nodes.size();
         in.wide_node_count = wide_nodes.size();
         in.block_count = blocks.size();
         in.rays = rays.data();
@@ -67,10 +64,8 @@ private:
         const glm::vec3 lower = 0.6f * random.point(), size = 0.4f * random.point();
         WideNode& wide = wide_nodes[i / kWideSize];
         for (int a = 0; a < 3; ++a) {
-            const float planes[2] = {lower[a], lower[a] + size[a]};
-            for (int side = 0; side < 2; ++side) {
-                nodes[i].plane[side][a] = wide.plane[side][a][i % kWideSize] = planes[side];
-            }
+            wide.plane[0][a][i % kWideSize] = lower[a];
+            wide.plane[1][a][i % kWideSize] = lower[a] + size[a];
         }
     }
 };

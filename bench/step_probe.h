@@ -3,7 +3,6 @@
 #pragma once
 
 #include "kernels/leaf.h"
-#include "kernels/packet_walk.h"
 #include "kernels/single_walk.h"
 
 #include <cstddef>
@@ -11,11 +10,10 @@
 
 namespace packet::bench {
 
-/// Each of the rays meets each of the boxes or triangles. Boxes come in both forms, eight to a wide
-/// node.
+/// Each of the rays meets each of the boxes or triangles.
 struct StepInput {
-    TreeView tree;  ///< has nodes, wide nodes, blocks, and the box of all
-    std::size_t node_count, wide_node_count, block_count;
+    TreeView tree;  ///< has wide nodes, blocks, and the box of all
+    std::size_t wide_node_count, block_count;
     const Ray* rays;
     std::size_t ray_count;  ///< a multiple of 16; each 16 share their directions' octant and axis
 };
@@ -69,9 +67,10 @@ template <Directions directions, int N, class Isa>
 std::uint64_t packets_meet_boxes(const StepInput& in) {
     std::uint64_t met = 0;
     for_each_packet<N, Isa>(in, [&](const PreparedRays<N, Isa>& rays, Float<N, Isa> best_t) {
-        for (std::size_t i = 0; i < in.node_count; ++i) {
-            const Interval<N, Isa> box = slabs<directions>(rays, in.tree.nodes[i]);
-            met += static_cast<std::uint64_t>(count(meets(rays, box, best_t)));
+        for (std::size_t i = 0; i < in.wide_node_count * kWideSize; ++i) {
+            const BoxPlanes<directions, N, Isa> planes(
+                in.tree.wide_nodes[i / kWideSize], static_cast<int>(i % kWideSize), rays.near_side);
+            met += static_cast<std::uint64_t>(count(meets(rays, planes.slabs(rays), best_t)));
         }
     });
     return met;

@@ -1,6 +1,7 @@
 // Walks a tree with the 32 rays of a warp that share one stack, as kernels/packet_walk.h does with
-// a packet's: by the same steps under the same names. A lane's Float is a register of its thread,
-// any() and count() are votes.
+// a packet's: by the same steps under the same names, but on the binary form, whose two boxes leave
+// a thread registers enough. A lane's Float is a register of its thread, any() and count() are
+// votes.
 //
 // All lanes of the warp go along, whether they have a ray or not: each vote is of the full warp.
 //
@@ -47,7 +48,8 @@ private:
 
 /// Where the lane enters a node's box, +inf if it misses it.
 PACKET_DEVICE Lane entry(const PreparedLane& ray, const Node& node, const Lane& best_t) {
-    const Interval<1, isa::CudaThread> box = slabs<Directions::kMixed>(ray, node);
+    const Interval<1, isa::CudaThread> box =
+        BoxPlanes<Directions::kMixed, 1, isa::CudaThread>(node, ray.near_side).slabs(ray);
     return select(meets(ray, box, best_t), box.enter, Lane(__builtin_huge_valf()));
 }
 

@@ -40,6 +40,7 @@ std::vector<Build> all_builds() {
         BuildOptions options;
         options.accel = accel.kind;
         options.treelet_bytes = 2000;  // so that small scenes have many
+        options.keep_binary_nodes = true;
         if (accel.kind != AccelKind::kKdSah) {
             out.push_back({std::string(accel.name), options});
             continue;

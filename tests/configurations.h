@@ -29,7 +29,8 @@ struct Build {
     BuildOptions options;
 };
 
-/// Every structure, in each way that it is built.
+/// Every structure, in each way that it is built; with binary nodes, which CUDA devices and some
+/// tests need.
 [[nodiscard]] std::vector<Build> all_builds();
 
 /// Modes x instruction sets that this CPU runs, on one thread, and on 2 and 3 threads by the best

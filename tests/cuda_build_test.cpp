@@ -196,6 +196,7 @@ TEST_CASE("the layout of a tree is the CPU's") {
     for (const AccelKind kind : {AccelKind::kBvhMorton, AccelKind::kKdSah}) {
         BuildOptions options;
         options.accel = kind;
+        options.keep_binary_nodes = true;
         const Tree want = build_tree(mesh.view(), options);
         for_thread_orders([&] { check_layout(cuda::download_tree(mesh.view(), options), want); });
     }

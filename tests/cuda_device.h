@@ -3,6 +3,7 @@
 
 #include <packet/cuda.h>
 #include <packet/error.h>
+#include <packet/scene.h>
 
 #if defined(PACKET_EMULATED)
 #include "emulation/grid.h"
@@ -21,6 +22,13 @@ namespace packet::test {
         std::cout << "skipped: " << error.what() << "\n";
         return false;
     }
+}
+
+/// With what devices walk.
+inline void commit_for_devices(Scene& scene) {
+    BuildOptions options;
+    options.keep_binary_nodes = true;
+    scene.commit(options);
 }
 
 // Orders in which threads run: those that the emulation has, or the one that a device chooses.

@@ -81,7 +81,7 @@ TEST_CASE("a scene of instances, some of one mesh") {
         if (i % 10 == 0) scene.add_instance(sphere, placed);  // twice at one place: ids decide
         if (i % 20 == 0) scene.add_instance(empty, placed);
     }
-    scene.commit();
+    commit_for_devices(scene);
     check_device(scene, random_rays(scene.bounds(), 1000, 29), "instances");
 }
 
@@ -104,7 +104,6 @@ TEST_CASE("a scene that is built on the device") {
     for (const AccelKind kind : {AccelKind::kBvhMorton, AccelKind::kKdSah}) {
         BuildOptions options;
         options.accel = kind;
-        options.keep_binary_nodes = false;  // which is about what the CPU keeps
         INFO(to_string(kind));
         const DeviceScene device(scene, options);
         for (const DeviceMode mode : kModes) check_mode(device, rays, want, {mode, 0, nullptr});
@@ -124,7 +123,7 @@ TEST_CASE("rays at features, rays without sense, no rays, no triangles") {
     const TriangleMesh grid =
         make_grid(6, 6, {-1, -1, 0.5f}, {0.3f, 0.01f, 0}, {-0.02f, 0.3f, 0.1f});
     Scene scene = make_scene(grid);
-    scene.commit();
+    commit_for_devices(scene);
     std::vector<Ray> rays = aim_at_features({0.1f, 0.3f, -3.7f}, grid.view());
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const float inf = std::numeric_limits<float>::infinity();
@@ -138,17 +137,17 @@ TEST_CASE("rays at features, rays without sense, no rays, no triangles") {
     check_device(scene, rays, "features");
     check_device(scene, {}, "no rays");
     Scene nothing = make_scene({});
-    nothing.commit();
+    commit_for_devices(nothing);
     check_device(nothing, rays, "no triangles");
     Scene none;
-    none.commit();
+    commit_for_devices(none);
     check_device(none, rays, "no instances");
 }
 
 TEST_CASE("work is counted as the CPU counts it") {
     if (!has_device()) return;
     Scene scene = make_scene(tools::make_terrain(2000, 3));
-    scene.commit();
+    commit_for_devices(scene);
     const auto rays = random_rays(scene.bounds(), 640, 5);
     std::vector<Hit> hits(rays.size());
     const DeviceScene device(scene);
@@ -185,7 +184,7 @@ TEST_CASE("errors of the device's interface") {
     if (!has_device()) return;
     Scene scene = make_scene(tools::make_sphere(32));
     CHECK_THROWS_AS(DeviceScene{scene}, Error);  // not committed
-    scene.commit();
+    commit_for_devices(scene);
     const DeviceScene device(scene);
     const std::vector<Ray> rays(3);
     std::vector<Hit> hits(2);
@@ -197,9 +196,7 @@ TEST_CASE("errors of the device's interface") {
     scene.commit(options);
     CHECK_THROWS_WITH(DeviceScene{scene},
                       "mesh 0 is in a grid, which CUDA devices do not walk: choose a tree");
-    options = {};
-    options.keep_binary_nodes = false;
-    scene.commit(options);
+    scene.commit();
     CHECK_THROWS_WITH(DeviceScene{scene},
                       "mesh 0 has no binary nodes, which CUDA devices walk: build with "
                       "BuildOptions::keep_binary_nodes");

@@ -222,6 +222,7 @@ TEST_CASE("a builder whose codes would lead too deep stays within kMaxDepth") {
     for (std::uint32_t i = 0; i < references.size(); ++i) references[i].id = i;
     BuildOptions options;
     options.max_leaf_size = 1;
+    options.keep_binary_nodes = true;
     for (const int bits : {30, 63}) {
         options.morton_bits = bits;
         const Parallel parallel(2);
@@ -237,6 +238,7 @@ TEST_CASE("Morton trees of few triangles") {
     BuildOptions options;
     options.accel = AccelKind::kBvhMorton;
     options.max_leaf_size = 1;
+    options.keep_binary_nodes = true;
     for (const std::size_t count : {1u, 2u, 3u}) {
         const Tree tree = build_tree(tools::make_soup(count, 4).view(), options);
         CHECK(tree.stats.leaf_count == count);

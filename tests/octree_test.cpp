@@ -13,6 +13,7 @@ namespace {
 
 BuildOptions octree_options(int max_leaf_size = 8) {
     BuildOptions options;
+    options.keep_binary_nodes = true;
     options.accel = AccelKind::kOctree;
     options.max_leaf_size = max_leaf_size;
     return options;

@@ -39,7 +39,7 @@ void run(const RenderOptions& options) {
     OutputFile file(options.output);  // first, so that a bad name is told before the work is done
     Scene scene = load_gltf(options.scene).scene;
     const Camera camera(options.camera, scene.bounds());
-    commit_visibly(scene, options.common.build);
+    commit_visibly(scene, build_options_for(options.device.value, options.common.build));
 
     const auto start = std::chrono::steady_clock::now();
     const Image image =

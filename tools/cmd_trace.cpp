@@ -139,7 +139,7 @@ void run(const TraceCommand& command) {
     const std::vector<Ray> rays = read_rays(command.rays);
     Scene scene = load_gltf(command.scene).scene;
     if (command.flatten) scene = make_scene(scene.flatten());
-    commit_visibly(scene, command.common.build);
+    commit_visibly(scene, build_options_for(command.device.value, command.common.build));
 
     Answer answer(command.query.value, rays.size());
     TraceReport report = describe(scene, command);

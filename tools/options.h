@@ -25,6 +25,12 @@ struct CommonOptions {
     TraceOptions trace;
 };
 
+/// With what the device walks.
+[[nodiscard]] inline BuildOptions build_options_for(Device device, BuildOptions options) {
+    options.keep_binary_nodes = device == Device::kCuda;
+    return options;
+}
+
 /// Adds an option whose value is a name. `help` is followed by the list of `names`. `take` throws
 /// an Error if it does not know the name it is given.
 CLI::Option* add_name_option(CLI::App& app, const std::string& flags, const std::string& help,

@@ -81,8 +81,8 @@ struct BuildOptions {
     /// Bits of Morton codes, for `kBvhMorton`: 30, 63, or 0 to choose by the number of triangles.
     /// 30 sort faster, 63 tell apart what is 2^-21 of the scene's extent from each other.
     int morton_bits = 0;
-    /// Keep trees in their binary form, too, as CUDA devices walk them. 32 bytes a node.
-    bool keep_binary_nodes = true;
+    /// Keep trees in their binary form, too, for CUDA devices, which walk that. 32 bytes a node.
+    bool keep_binary_nodes = false;
     /// Bytes of a treelet, at most, with its triangles (but one node is not cut), as
     /// kUsualTreeletBytes; 0 cuts none, and then `Mode::kTreelet` is as `Mode::kStream`. Larger
     /// ones have more rays to share what is fetched, smaller ones stay in a nearer cache. Cutting

@@ -199,6 +199,10 @@ public:
         end_ = bounds.end + __builtin_fabsf(bounds.end) * kRounding + bounds.margin;
     }
 
+    [[nodiscard]] PACKET_INLINE std::uint32_t meets(const WideNode& node) const {
+        F depth;
+        return meets(node, depth);
+    }
     /// The children whose boxes the beam may meet, and in `depth` where along its way.
     PACKET_INLINE std::uint32_t meets(const WideNode& node, F& depth) const {
         depth = F::load(node.plane[near_side_][axis_[2]]) * sign_;

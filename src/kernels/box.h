@@ -29,23 +29,42 @@ PACKET_INLINE Interval<N, Isa> slabs(const Rays& ray, const Float<N, Isa> (&lowe
     return out;
 }
 
-/// Rays against a node's box. With shared directions the near planes are picked by address; the
-/// result is the same, as lower <= upper.
+/// The planes of a node's box, each in all lanes. With shared directions the planes that are met
+/// first are picked by address; the result is the same, as lower <= upper.
 template <Directions directions, int N, class Isa>
-PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray, const Node& node) {
+struct BoxPlanes {
     using F = Float<N, Isa>;
-    Interval<N, Isa> out;
-    for (int a = 0; a < 3; ++a) {
-        const int near = directions == Directions::kShared ? ray.near_side[a] : 0;
-        const F t0 = multiply_subtract(F(node.plane[near][a]), ray.inv_dir[a], ray.shift[0][a]);
-        const F t1 = multiply_subtract(F(node.plane[1 - near][a]), ray.inv_dir[a], ray.shift[1][a]);
-        const F t_near = directions == Directions::kShared ? t0 : min(t0, t1);
-        const F t_far = directions == Directions::kShared ? t1 : max(t0, t1);
-        out.enter = a == 0 ? t_near : max(out.enter, t_near);
-        out.exit = a == 0 ? t_far : min(out.exit, t_far);
+    F near[3], far[3];  ///< kMixed: lower and upper
+
+    /// Of a wide node's child.
+    PACKET_INLINE BoxPlanes(const WideNode& node, int child, const int (&near_side)[3]) {
+        for (int a = 0; a < 3; ++a) {
+            const int side = directions == Directions::kShared ? near_side[a] : 0;
+            near[a] = node.plane[side][a][child];
+            far[a] = node.plane[1 - side][a][child];
+        }
     }
-    return out;
-}
+    PACKET_INLINE BoxPlanes(const Node& node, const int (&near_side)[3]) {
+        for (int a = 0; a < 3; ++a) {
+            const int side = directions == Directions::kShared ? near_side[a] : 0;
+            near[a] = node.plane[side][a];
+            far[a] = node.plane[1 - side][a];
+        }
+    }
+    /// Where rays enter and leave the box.
+    PACKET_INLINE Interval<N, Isa> slabs(const PreparedRays<N, Isa>& ray) const {
+        Interval<N, Isa> out;
+        for (int a = 0; a < 3; ++a) {
+            const F t0 = multiply_subtract(near[a], ray.inv_dir[a], ray.shift[0][a]);
+            const F t1 = multiply_subtract(far[a], ray.inv_dir[a], ray.shift[1][a]);
+            const F t_near = directions == Directions::kShared ? t0 : min(t0, t1);
+            const F t_far = directions == Directions::kShared ? t1 : max(t0, t1);
+            out.enter = a == 0 ? t_near : max(out.enter, t_near);
+            out.exit = a == 0 ? t_far : min(out.exit, t_far);
+        }
+        return out;
+    }
+};
 
 /// The lanes that may find something nearer than, or as near as, `best_t` in the box.
 template <int N, class Isa>

@@ -104,12 +104,14 @@ PACKET_INLINE void meet_cell_directed(const TreeView& tree, const GridCell& cell
         return;
     }
     const TreeView subtree = tree_of_cell(tree, cell);
-    walk_tree<directions>(subtree, ray, best.t, stats,
-                          [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> in_leaf) {
-                              meet_items<query, directions>(subtree, ray, first, item_count,
-                                                            count(in_leaf), instance_id, mailbox,
-                                                            best, stats);
-                          });
+    PacketWalk<query, directions, N, Isa, Stats> walk(subtree, ray, best.t, stats);
+    walk.run(
+        NoBeam{},
+        [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> in_leaf) {
+            meet_items<query, directions>(subtree, ray, first, item_count, count(in_leaf),
+                                          instance_id, mailbox, best, stats);
+        },
+        NeverAlone{});
 }
 
 template <Query query, int N, class Isa, class Stats>

@@ -29,9 +29,11 @@ PACKET_INLINE void prefetch(const TreeView& tree, const WideChild& child) {
     const void* const at = child.is_leaf()
                                ? static_cast<const void*>(tree.blocks + child.link / kBlockSize)
                                : tree.wide_nodes + child.link;
-    constexpr int kLines = static_cast<int>(sizeof(TriangleBlock)) / 64;
+    constexpr std::size_t kLines = sizeof(TriangleBlock) / 64;
     static_assert(sizeof(WideNode) <= sizeof(TriangleBlock));
-    for (int i = 0; i < kLines; ++i) __builtin_prefetch(static_cast<const char*>(at) + 64 * i);
+    for (std::size_t i = 0; i < kLines; ++i) {
+        __builtin_prefetch(static_cast<const char*>(at) + 64 * i);
+    }
 }
 
 /// A packet meets triangles one by one, each broadcast to all lanes.

@@ -5,22 +5,9 @@
 
 #include "kernels/grid_packet.h"
 #include "kernels/grid_walk.h"
-#include "kernels/leaf.h"
-#include "kernels/packet_walk.h"
+#include "kernels/mesh_walk.h"
 
 namespace packet {
-
-template <Query query, Directions directions, int N, class Isa, class Stats>
-PACKET_INLINE void walk_mesh_directed(const TreeView& tree, const PreparedRays<N, Isa>& ray,
-                                      std::int32_t instance_id, BestHits<N, Isa>& best,
-                                      Stats& stats) {
-    const PacketLeaf<query, directions, N, Isa> leaf{tree, ray, instance_id, best};
-    walk_tree<directions>(tree, ray, best.t, stats,
-                          [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
-                              stats.triangles(count(active) * static_cast<int>(item_count));
-                              leaf.meet(BlockRange{first, item_count}, active);
-                          });
-}
 
 /// The lanes of `ray` that are usable in the mesh's space and still look for something meet the
 /// mesh.
@@ -40,9 +27,13 @@ template <Query query, int N, class Isa, class Stats>
     if (tree.grid.bricks != nullptr) {
         walk_grid<query>(tree, ray, prepared, active, instance_id, best, stats);
     } else if (prepared.directions == Directions::kShared) {
-        walk_mesh_directed<query, Directions::kShared>(tree, prepared, instance_id, best, stats);
+        MeshWalk<query, Directions::kShared, N, Isa, Stats>(tree, ray, prepared, instance_id, best,
+                                                            stats)
+            .run();
     } else {
-        walk_mesh_directed<query, Directions::kMixed>(tree, prepared, instance_id, best, stats);
+        MeshWalk<query, Directions::kMixed, N, Isa, Stats>(tree, ray, prepared, instance_id, best,
+                                                           stats)
+            .run();
     }
     best.t = select(active, best.t, kept);
 }
@@ -73,11 +64,13 @@ PACKET_INLINE void walk_scene(const SceneView& scene, const RayLanes<N, Isa>& ra
     if (scene.top.node_count == 0) return;
     PreparedRays<N, Isa> prepared;
     prepare_boxes(prepared, scene.top, ray);
-    walk_tree<Directions::kMixed>(
-        scene.top, prepared, best.t, stats,
+    PacketWalk<query, Directions::kMixed, N, Isa, Stats> walk(scene.top, prepared, best.t, stats);
+    walk.run(
+        NoBeam{},
         [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
             meet_instances<query>(scene, ray, first, item_count, active, best, stats);
-        });
+        },
+        NeverAlone{});
 }
 
 }  // namespace packet

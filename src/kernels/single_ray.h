@@ -137,8 +137,12 @@ public:
     PACKET_INLINE SingleRay(const PreparedLanes& from, int lane)
         : numbers_(from.number[0] + lane), indices_(from.index[0] + lane) {}
 
-    PACKET_INLINE const float& number(int which) const { return numbers_[which * kSingleLanes]; }
-    PACKET_INLINE std::int32_t index(int which) const { return indices_[which * kSingleLanes]; }
+    PACKET_INLINE const float& number(int which) const {
+        return numbers_[std::ptrdiff_t{which} * kSingleLanes];
+    }
+    PACKET_INLINE std::int32_t index(int which) const {
+        return indices_[std::ptrdiff_t{which} * kSingleLanes];
+    }
     PACKET_INLINE bool is_backward(int axis) const {
         return index(PreparedLanes::kNearPlanes + axis) != axis * kWideSize;
     }

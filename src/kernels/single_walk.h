@@ -125,14 +125,13 @@ PACKET_INLINE WideChild descend(const WideNode& node, const Float<kWideSize, Isa
     return node.child[near & (kWideSize - 1)];
 }
 
-/// Calls leaf(first, count) for each leaf whose box the ray meets before `best_t`, which leaf may
-/// lower; kNever ends the walk.
+/// Calls leaf(first, count) for each leaf of the subtree of `next` whose box the ray meets before
+/// `best_t`, which leaf may lower; kNever ends the walk.
 template <Query query, class Isa, class Stats, class Leaf>
 PACKET_INLINE void walk_wide_tree(const TreeView& tree, const SingleRay& ray, const float& best_t,
-                                  Stats& stats, Leaf&& leaf) {
+                                  Stats& stats, Leaf&& leaf, WideChild next = {0, 0}) {
     using F = Float<kWideSize, Isa>;
     SingleStack stack;
-    WideChild next = {0, 0};
     for (;;) {
         // Read anew after leaves, which need all registers.
         const WideRay<Isa> wide(opaque(ray));

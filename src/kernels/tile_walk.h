@@ -9,7 +9,7 @@
 
 #include "kernels/beam.h"
 #include "kernels/box.h"
-#include "kernels/leaf.h"
+#include "kernels/lone_lanes.h"
 
 namespace packet {
 
@@ -97,37 +97,15 @@ private:
         }
     }
 
-    /// A child's planes in all lanes, in the order in which they are met.
-    struct ChildPlanes {
-        F near[3], far[3];
-
-        PACKET_INLINE ChildPlanes(const WideNode& node, std::uint32_t child,
-                                  const int (&near_side)[3]) {
-            for (int a = 0; a < 3; ++a) {
-                near[a] = node.plane[near_side[a]][a][child];
-                far[a] = node.plane[1 - near_side[a]][a][child];
-            }
-        }
-        PACKET_INLINE M meets(const PreparedRays<N, Isa>& ray, const F& best_t) const {
-            Interval<N, Isa> box;
-            for (int a = 0; a < 3; ++a) {
-                const F t_near = multiply_subtract(near[a], ray.inv_dir[a], ray.shift[0][a]);
-                const F t_far = multiply_subtract(far[a], ray.inv_dir[a], ray.shift[1][a]);
-                box.enter = a == 0 ? t_near : max(box.enter, t_near);
-                box.exit = a == 0 ? t_far : min(box.exit, t_far);
-            }
-            return packet::meets(ray, box, best_t);
-        }
-    };
-
     /// The packets that meet the child's box; in active_ their lanes that do.
     PACKET_INLINE std::uint32_t active_packets(const TileEntry& entry) {
         std::uint32_t left = entry.packets & looking_, out = 0;
         if (left == 0) return 0;
-        const ChildPlanes planes(*entry.node, entry.child, near_side_);
+        const BoxPlanes<Directions::kShared, N, Isa> planes(
+            *entry.node, static_cast<int>(entry.child), near_side_);
         for (; left != 0; left &= left - 1) {
             const int p = __builtin_ctz(left);
-            const M active = planes.meets(rays_[p], best_[p].t);
+            const M active = meets(rays_[p], planes.slabs(rays_[p]), best_[p].t);
             if (none(active)) continue;
             active_[p] = active;
             if constexpr (query == Query::kAny) {
@@ -171,17 +149,7 @@ private:
             stored_ |= 1u << p;
             store_lanes(rays_[p], lanes_[p]);
         }
-        float best_t[N];
-        best_[p].t.store(best_t);
-        for (std::uint32_t left = active_[p].bits(); left != 0; left &= left - 1) {
-            const int r = __builtin_ctz(left);
-            if (query == Query::kAny && best_t[r] == kNever) continue;
-            const SingleRay ray(lanes_[p][r / kSingleLanes], r % kSingleLanes);
-            meet_block(shear_of<kBlockSize, Isa>(ray), ray, best_t[r], block,
-                       [&](const BlockHit& hit) {
-                           best_[p].template update<query>(hit, instance_id_, 1u << r);
-                       });
-        }
+        LoneLanes<query, N, Isa>(tree_, lanes_[p], instance_id_, best_[p]).meet(block, active_[p]);
     }
 
     const TreeView& tree_;

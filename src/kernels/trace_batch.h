@@ -244,6 +244,7 @@ PACKET_INLINE void trace_by(const TraceBatch& batch, Trace&& trace) {
         const std::size_t left = batch.count - begin;
         const int count = left < kCount ? static_cast<int>(left) : kCount;
         const RayColumns columns = gather_rays(batch, begin, count, rays);
+        prefetch_rays(batch, begin + static_cast<std::size_t>(count), kCount);
         trace(columns, count, hits);
         scatter_hits<query>(batch, begin, count, hits);
     }

@@ -1,0 +1,83 @@
+// Walks the tree of a mesh with a packet: in a beam if its lanes share their directions, and lane
+// by lane where only few go.
+#pragma once
+
+#include "kernels/beam.h"
+#include "kernels/lone_lanes.h"
+#include "kernels/packet_walk.h"
+
+namespace packet {
+
+/// A packet in a mesh.
+template <Query query, Directions directions, int N, class Isa, class Stats>
+class MeshWalk {
+public:
+    PACKET_INLINE MeshWalk(const TreeView& tree, const RayLanes<N, Isa>& ray,
+                           const PreparedRays<N, Isa>& prepared, std::int32_t instance_id,
+                           BestHits<N, Isa>& best, Stats& stats)
+        : tree_(tree),
+          ray_(ray),
+          prepared_(prepared),
+          instance_id_(instance_id),
+          best_(best),
+          stats_(stats) {}
+
+    PACKET_INLINE void run() {
+        if constexpr (directions == Directions::kShared) {
+            const BeamBounds bounds = bound_rays(&prepared_, &best_, 1);
+            if (bounds.is_sound) return run(Beam<Isa>(bounds));
+        }
+        run(NoBeam{});
+    }
+
+private:
+    template <class BeamOrNone>
+    PACKET_INLINE void run(const BeamOrNone& beam) {
+        PacketWalk<query, directions, N, Isa, Stats> walk(tree_, prepared_, best_.t, stats_);
+        walk.run(
+            beam,
+            [&](std::uint32_t first, std::uint32_t item_count, Mask<N, Isa> active) {
+                meet_leaf({first, item_count}, active, beam);
+            },
+            Alone{*this});
+    }
+    template <class BeamOrNone>
+    PACKET_INLINE void meet_leaf(BlockRange range, Mask<N, Isa> active, const BeamOrNone& beam) {
+        const PacketLeaf<query, directions, N, Isa> leaf{tree_, prepared_, instance_id_, best_};
+        for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
+            const TriangleBlock& block = tree_.blocks[b];
+            const std::uint32_t triangles = range.lanes(b) & beam.meets(block);
+            stats_.triangles(count(active) * __builtin_popcount(triangles));
+            if (count(active) < __builtin_popcount(triangles)) {
+                lone_lanes().meet(block, active);
+            } else {
+                leaf.meet(block, triangles, active);
+            }
+        }
+    }
+
+    struct Alone {
+        // Measured: docs/benchmarking.md#packets.
+        static constexpr int kFewest = N / 4;
+        MeshWalk& walk;
+        PACKET_NOINLINE void operator()(const WideChild& child, Mask<N, Isa> active) const {
+            walk.lone_lanes().walk(child, active, walk.stats_);
+        }
+    };
+    PACKET_INLINE LoneLanes<query, N, Isa> lone_lanes() {
+        if (!are_prepared_) prepare_lanes<N, Isa>(tree_, ray_, lanes_);
+        are_prepared_ = true;
+        return {tree_, lanes_, instance_id_, best_};
+    }
+
+    const TreeView& tree_;
+    const RayLanes<N, Isa>& ray_;
+    const PreparedRays<N, Isa>& prepared_;
+    std::int32_t instance_id_;
+    BestHits<N, Isa>& best_;
+    Stats& stats_;
+    bool are_prepared_ = false;  ///< lanes_
+    PreparedLanes lanes_[N / kSingleLanes];
+};
+
+}  // namespace packet
