@@ -106,9 +106,9 @@ void append_batch(const KdBatchNodes& batch, const KdDeviceLevel& leaves, const 
         if (end != begin) levels.push_back({begin, end});
         begin = end;
     }
-    for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
-        for_each_item(level->end - level->begin, stream, count_below, nodes, *level,
-                      numbers.data());
+    for (std::size_t i = levels.size(); i-- > 0;) {
+        const NodeSpan& level = levels[i];
+        for_each_item(level.end - level.begin, stream, count_below, nodes, level, numbers.data());
     }
     DeviceArray<std::uint64_t> sizes(root_count), size_sums(root_count + 1);
     PrefixSums prefix_sums;

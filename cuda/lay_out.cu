@@ -102,8 +102,9 @@ DeviceBuiltTree lay_out(const DeviceHierarchy& hierarchy, const UploadedMesh& me
     out.bounds = hierarchy.nodes.value(0, stream).bounds;
     out.arrays.nodes.make_room(out.node_count);
     out.arrays.triangles.make_room(hierarchy.reference_count);
-    for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
-        for_each_item(level->end - level->begin, stream, count_nodes, nodes, *level, list.data(),
+    for (std::size_t i = levels.size(); i-- > 0;) {
+        const LevelSpan& level = levels[i];
+        for_each_item(level.end - level.begin, stream, count_nodes, nodes, level, list.data(),
                       sizes.data());
     }
     for (const LevelSpan& level : levels) {

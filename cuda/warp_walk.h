@@ -1,7 +1,7 @@
 // Walks a tree with the 32 rays of a warp that share one stack, as kernels/packet_walk.h does with
-// a packet's: by the same steps under the same names, but on the binary form, whose two boxes leave
-// a thread registers enough. A lane's Float is a register of its thread, any() and count() are
-// votes.
+// a packet's: by the same steps under the same names, but on the binary form, since the boxes of
+// eight children would be met one after the other as well. A lane's Float is a register of its
+// thread, any() and count() are votes.
 //
 // All lanes of the warp go along, whether they have a ray or not: each vote is of the full warp.
 //
