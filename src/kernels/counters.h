@@ -10,6 +10,7 @@
 namespace packet {
 
 struct NoCounters {
+    static constexpr bool kCounts = false;
     PACKET_INLINE explicit NoCounters(TraceStats*) {}
     PACKET_INLINE void visit(int, int) {}
     PACKET_INLINE void triangles(int) {}
@@ -18,6 +19,7 @@ struct NoCounters {
 
 class Counters {
 public:
+    static constexpr bool kCounts = true;
     PACKET_INLINE explicit Counters(TraceStats* stats) : stats_(*stats) {}
     /// `active` of `lanes` lanes visit a node.
     PACKET_INLINE void visit(int active, int lanes) {

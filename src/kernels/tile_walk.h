@@ -97,25 +97,43 @@ private:
         }
     }
 
-    /// The packets that meet the child's box; in active_ their lanes that do.
+    /// The packets to go on with: of a leaf those that meet its box, and in active_ their lanes
+    /// that do; of a node for closest-hit all from the first that does, since below it they are met
+    /// with smaller boxes.
     PACKET_INLINE std::uint32_t active_packets(const TileEntry& entry) {
         std::uint32_t left = entry.packets & looking_, out = 0;
         if (left == 0) return 0;
         const BoxPlanes<Directions::kShared, N, Isa> planes(
             *entry.node, static_cast<int>(entry.child), near_side_);
+        const bool is_leaf = entry.node->child[entry.child].is_leaf();
         for (; left != 0; left &= left - 1) {
             const int p = __builtin_ctz(left);
             const M active = meets(rays_[p], planes.slabs(rays_[p]), best_[p].t);
             if (none(active)) continue;
+            if (!is_leaf) stats_.visit(count(active), N);
+            if (query == Query::kClosest && !is_leaf) {
+                count_visits(planes, left & (left - 1));
+                return left;
+            }
             active_[p] = active;
             if constexpr (query == Query::kAny) {
                 use_.lanes += static_cast<std::uint32_t>(count(active));
                 ++use_.packets;
             }
             out |= 1u << p;
-            if (!entry.node->child[entry.child].is_leaf()) stats_.visit(count(active), N);
         }
         return out;
+    }
+    /// Of packets that go along without being asked whether they meet the box.
+    PACKET_INLINE void count_visits(const BoxPlanes<Directions::kShared, N, Isa>& planes,
+                                    std::uint32_t packets) {
+        if constexpr (Stats::kCounts) {
+            for (; packets != 0; packets &= packets - 1) {
+                const int p = __builtin_ctz(packets);
+                const M active = meets(rays_[p], planes.slabs(rays_[p]), best_[p].t);
+                if (any(active)) stats_.visit(count(active), N);
+            }
+        }
     }
 
     PACKET_INLINE void meet_leaf(BlockRange range, std::uint32_t packets) {
