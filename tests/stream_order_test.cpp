@@ -47,6 +47,25 @@ TEST_CASE("rays are sorted by class, then by origin") {
     CHECK(order.sort({}).empty());
 }
 
+TEST_CASE("many rays are sorted as few are, by any number of threads") {
+    const Bounds3f world{{-1, -2, -3}, {4, 1, 2}};
+    for (const std::size_t count : {std::size_t{0}, std::size_t{1}, StreamOrder::kMostRays}) {
+        const std::vector<Ray> rays = random_rays(world, count, 5);
+        StreamOrder order;
+        for (const int threads : {1, 2}) {
+            CHECK(std::ranges::equal(order_of_many(rays, Parallel(threads)), order.sort(rays)));
+        }
+    }
+    const std::vector<Ray> rays = random_rays(world, 200'000, 5);
+    const auto sorted = order_of_many(rays, Parallel(2));
+    CHECK(std::ranges::equal(sorted, order_of_many(rays, Parallel(1))));
+    std::vector<std::uint32_t> all(sorted.begin(), sorted.end()), want(rays.size());
+    CHECK(std::ranges::is_sorted(all, {}, [&](auto i) { return class_of(rays[i]); }));
+    std::ranges::sort(all);
+    std::iota(want.begin(), want.end(), 0u);
+    CHECK(all == want);
+}
+
 TEST_CASE("rays that follow each other start near each other") {
     const Bounds3f world{{0, 0, 0}, {1, 1, 1}};
     std::vector<Ray> rays = random_rays(world, 20000, 6);

@@ -59,6 +59,8 @@ private:
         for (int r = 0; r < count; ++r) {
             const std::size_t at = begin + static_cast<std::size_t>(r);
             pending_[r] = batch_.pending[at];
+            // Needed once the ray has left, and anywhere in memory.
+            if (pending_[r] != kNoSlot) __builtin_prefetch(queues_.slots + pending_[r], 1);
             if (batch_.prim_id[at] < 0) continue;
             rays_.best[r].prim_id = batch_.prim_id[at];
             rays_.best[r].tie_prim_id = batch_.prim_id[at];

@@ -4,6 +4,7 @@
 #include "core/macros.h"
 #include "core/morton.h"
 #include "core/views.h"
+#include "schedule/radix_sort.h"
 
 #include <packet/bounds.h>
 
@@ -26,7 +27,9 @@ constexpr int kLowBits = 9, kHighBits = 8;
 constexpr int kHighShift = kIndexBits + kLowBits;
 static_assert(StreamOrder::kMostRays == std::size_t{1} << kIndexBits);
 static_assert(kDirectionClasses <= 1 << kClassBits);
-static_assert(kLowBits + kHighBits == 3 * kCellBits + kClassBits);
+
+constexpr int kKeyBits = 3 * kCellBits + kClassBits;
+static_assert(kLowBits + kHighBits == kKeyBits);
 
 constexpr std::uint32_t low_digit(std::uint32_t item) noexcept {
     return item >> kIndexBits & ((1u << kLowBits) - 1);
@@ -79,6 +82,12 @@ private:
     float scale_ = 0.0f;
 };
 
+/// By what rays are sorted: kKeyBits.
+std::uint32_t key_of(const Ray& ray, const OriginCells& cells) noexcept {
+    const int direction = direction_class(ray.dir.x, ray.dir.y, ray.dir.z);
+    return static_cast<std::uint32_t>(direction) << 3 * kCellBits | cells.code(ray.org);
+}
+
 /// Turns counts into the place of the first item of each digit.
 template <std::size_t kCount>
 void scan(std::array<std::uint32_t, kCount>& counts) noexcept {
@@ -95,12 +104,8 @@ std::span<const std::uint32_t> StreamOrder::sort(std::span<const Ray> rays) {
     std::array<std::uint32_t, 1u << kLowBits> low = {};
     std::array<std::uint32_t, 1u << kHighBits> high = {};
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        const Ray& ray = rays[i];
-        const auto direction =
-            static_cast<std::uint32_t>(direction_class(ray.dir.x, ray.dir.y, ray.dir.z));
-        const std::uint32_t item = direction << (kIndexBits + 3 * kCellBits) |
-                                   cells.code(ray.org) << kIndexBits |
-                                   static_cast<std::uint32_t>(i);
+        const std::uint32_t item =
+            key_of(rays[i], cells) << kIndexBits | static_cast<std::uint32_t>(i);
         ++low[low_digit(item)], ++high[high_digit(item)];
         items_[i] = item;
     }
@@ -110,6 +115,28 @@ std::span<const std::uint32_t> StreamOrder::sort(std::span<const Ray> rays) {
         items_[high[high_digit(item)]++] = item & ((1u << kIndexBits) - 1);
     }
     return items_;
+}
+
+ScratchVector<std::uint32_t> order_of_many(std::span<const Ray> rays, const Parallel& parallel) {
+    constexpr std::size_t kGrain = 65536;  // 100 us or more
+    struct Item {
+        std::uint32_t key, index;
+    };
+    const OriginCells cells(rays);
+    ScratchVector<Item> items(rays.size()), scratch(rays.size());
+    parallel.for_pieces(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            items[i] = {key_of(rays[i], cells), static_cast<std::uint32_t>(i)};
+        }
+    });
+    const std::span<const Item> sorted =
+        radix_sort(std::span<Item>(items), std::span<Item>(scratch), kKeyBits, parallel,
+                   [](const Item& item) { return item.key; });
+    ScratchVector<std::uint32_t> out(rays.size());
+    parallel.for_pieces(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) out[i] = sorted[i].index;
+    });
+    return out;
 }
 
 std::unique_ptr<StreamOrder> StreamOrders::take() {

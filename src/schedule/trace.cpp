@@ -53,10 +53,9 @@ public:
 
     [[nodiscard]] bool goes_by_treelets() const { return plan_.by_treelets; }
 
-    /// Each thread has its own queues and takes rays as long as there are any.
+    /// As many rays at a time as are sorted together: the more, the more wait at a treelet.
     void run_by_treelets(KernelTable::Treelet kernel, Hit* hits, std::uint8_t* occluded) const {
-        constexpr std::size_t kMostRays = 0xFFFFFFFF - StreamOrder::kMostRays;
-        const auto threads = static_cast<std::size_t>(parallel_.threads());
+        constexpr std::size_t kMostRays = std::size_t{1} << 22;  // 80 MB to sort, then 16
         for (std::size_t first = 0; first < rays_.size(); first += kMostRays) {
             const std::size_t count = std::min(kMostRays, rays_.size() - first);
             const TraceBatch batch{&scene_.view,
@@ -66,14 +65,7 @@ public:
                                    hits == nullptr ? nullptr : hits + first,
                                    occluded == nullptr ? nullptr : occluded + first,
                                    options_.stats};
-            const TreeletJob job{batch, kernel, options_.queue_bytes / threads,
-                                 static_cast<std::uint32_t>(options_.queue_chunk),
-                                 rays_per_stream_task(count, parallel_.threads())};
-            std::atomic<std::size_t> next{0};
-            parallel_.run([&] {
-                parallel_.for_pieces(threads, 1,
-                                     [&](std::size_t, std::size_t) { run_thread(job, next); });
-            });
+            parallel_.run([&] { run_queues(batch, kernel); });
         }
     }
 
@@ -92,6 +84,30 @@ public:
     }
 
 private:
+    /// Each thread has its own queues and takes rays as long as there are any.
+    void run_queues(const TraceBatch& batch, KernelTable::Treelet kernel) const {
+        const auto order = order_of_many({batch.rays, batch.count}, parallel_);
+        clear(batch);  // kernels write where something is hit
+        const auto threads = static_cast<std::size_t>(parallel_.threads());
+        const TreeletJob job{batch,
+                             kernel,
+                             options_.queue_bytes / threads,
+                             static_cast<std::uint32_t>(options_.queue_chunk),
+                             order.data(),
+                             rays_per_stream_task(batch.count, parallel_.threads())};
+        std::atomic<std::size_t> next{0};
+        parallel_.for_pieces(threads, 1, [&](std::size_t, std::size_t) { run_thread(job, next); });
+    }
+    void clear(const TraceBatch& batch) const {
+        constexpr std::size_t kGrain = 65536;  // a megabyte or so of hits
+        parallel_.for_pieces(batch.count, kGrain, [&](std::size_t begin, std::size_t end) {
+            const std::size_t count = end - begin;
+            if (batch.hits != nullptr) std::fill_n(batch.hits + begin, count, Hit{});
+            if (batch.occluded != nullptr) {
+                std::fill_n(batch.occluded + begin, count, std::uint8_t{0});
+            }
+        });
+    }
     void run_thread(const TreeletJob& job, std::atomic<std::size_t>& next) const {
         const std::size_t all = job.batch.count;
         const double part_of_one = 1.0 / static_cast<double>(rays_.size());

@@ -130,18 +130,10 @@ TreeletScheduler::TreeletScheduler(const TreeletJob& job)
 }
 
 void TreeletScheduler::start(std::size_t begin, std::size_t count) {
-    const TraceBatch& all = job_.batch;
-    const auto sorted = order_.sort({all.rays + begin, count});
-    started_.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        started_[i] = static_cast<std::uint32_t>(begin) + sorted[i];
-    }
-    if (all.hits != nullptr) std::fill_n(all.hits + begin, count, Hit{});
-    if (all.occluded != nullptr) std::fill_n(all.occluded + begin, count, std::uint8_t{0});
-    TreeletBatch batch{all, 0, nullptr, nullptr, nullptr, &pool_, exits_.data()};
-    batch.rays.order = started_.data();
+    TreeletBatch batch{job_.batch, 0, nullptr, nullptr, nullptr, &pool_, exits_.data()};
+    batch.rays.order = job_.order + begin;
     batch.rays.count = count;
-    batch.rays.stats = all.stats != nullptr ? &stats_ : nullptr;
+    batch.rays.stats = job_.batch.stats != nullptr ? &stats_ : nullptr;
     stats_.rays += count;
     job_.kernel(batch);
 }

@@ -10,7 +10,6 @@
 #pragma once
 
 #include "kernels/kernel_table.h"
-#include "schedule/stream_order.h"
 
 #include "core/aligned_vector.h"
 
@@ -62,11 +61,12 @@ private:
 
 /// What the threads of a call have in common.
 struct TreeletJob {
-    TraceBatch batch;  ///< all rays, 2^32 - 1 at most
+    TraceBatch batch;  ///< all rays, fewer than 2^32
     KernelTable::Treelet kernel;
     std::size_t queue_bytes;  ///< for each thread
     std::uint32_t chunk;
-    std::size_t rays_per_start;  ///< that are sorted and started together
+    const std::uint32_t* order;  ///< in which they start, as that of streams
+    std::size_t rays_per_start;
 };
 
 /// One thread's queues. Several may trace one call's rays, each some of them.
@@ -74,8 +74,7 @@ class TreeletScheduler {
 public:
     explicit TreeletScheduler(const TreeletJob& job);
 
-    /// Takes rays `begin` to `begin + count` through the root's treelet, at most
-    /// StreamOrder::kMostRays.
+    /// Takes `count` rays from `begin` of the job's order on through the root's treelet.
     void start(std::size_t begin, std::size_t count);
     /// Whether to start() rays rather than to run().
     [[nodiscard]] bool has_room() const noexcept { return pool_.has_room(); }
@@ -93,8 +92,6 @@ private:
     const TreeletJob& job_;
     const TreeView& tree_;
     TreeletQueuePool pool_;
-    StreamOrder order_;
-    std::vector<std::uint32_t> started_;
     ScratchVector<QueuedRay> taken_;
     std::vector<std::uint8_t> class_of_;
     std::vector<std::uint32_t> rays_, pending_;
