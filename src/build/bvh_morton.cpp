@@ -62,10 +62,11 @@ template <class Code>
 class RangeBuilder {
 public:
     RangeBuilder(std::span<const MortonItem<Code>> items, std::span<const Reference> references,
-                 const RadixKeys<Code>& keys, const LeafRule& rule)
-        : items_(items), references_(references), keys_(keys), rule_(rule) {}
+                 const RadixKeys<Code>& keys, const LeafRule& rule, std::span<std::uint32_t> ids)
+        : items_(items), references_(references), keys_(keys), rule_(rule), ids_(ids) {}
 
-    /// Over items `first` to `last`. Children are in nodes(), and referred to by their place there.
+    /// Over items `first` to `last`, whose ids it fills in. Children are in nodes(), and referred
+    /// to by their place there.
     Rooted build(std::uint32_t first, std::uint32_t last) {
         nodes_.clear();
         nodes_.reserve(2 * std::size_t{last - first + 1});
@@ -91,7 +92,9 @@ private:
 
     Rooted make_leaf(std::uint32_t item) const {
         if (item >= kAhead) __builtin_prefetch(&references_[items_[item - kAhead].index]);
-        const Bounds3f bounds = references_[items_[item].index].bounds();
+        const Reference& reference = references_[items_[item].index];
+        const Bounds3f bounds = reference.bounds();
+        ids_[item] = reference.id;
         return {{bounds, item, 0, 1}, rule_.leaf(item, bounds.half_area())};
     }
     /// The last one, on the left, with the one before it, which it replaces.
@@ -112,6 +115,7 @@ private:
     std::span<const Reference> references_;
     const RadixKeys<Code>& keys_;
     const LeafRule& rule_;
+    std::span<std::uint32_t> ids_;  ///< by item
     std::vector<BuildNode> nodes_;
     Entry stack_[kMortonBits<Code> + 33];  ///< each lacks a bit of the key that the last one has
 };
@@ -134,16 +138,14 @@ public:
         parallel_.advance(kShareOfSort);
         Hierarchy out;
         nodes_.resize(2 * count_ - 1);
+        out.ids.resize(count_);
+        ids_ = out.ids;
         // Only where codes that differ in nearly every bit meet many that are equal.
         if (build_nodes(0) > kMaxDepth) {
             build_nodes(dropped_bits_for_depth(kMortonBits<Code>, count_));
         }
         nodes_.resize(used_);
         out.nodes = std::move(nodes_);
-        out.ids.resize(count_);
-        parallel_.for_pieces(count_, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) out.ids[i] = references_[items_[i].index].id;
-        });
         return out;
     }
 
@@ -186,7 +188,7 @@ private:
     }
 
     Rooted build_task(const RadixKeys<Code>& keys, std::uint32_t first, std::uint32_t last) {
-        RangeBuilder<Code> builder(items_, references_, keys, rule_);
+        RangeBuilder<Code> builder(items_, references_, keys, rule_, ids_);
         Rooted out = builder.build(first, last);
         const auto count = static_cast<std::uint32_t>(builder.nodes().size());
         const std::uint32_t last_place =
@@ -210,6 +212,7 @@ private:
     ScratchVector<Reference> references_;
     ScratchVector<Item> items_;
     ScratchVector<BuildNode> nodes_;
+    std::span<std::uint32_t> ids_;         ///< of the hierarchy, by item
     std::atomic<std::uint32_t> used_ = 1;  ///< nodes; the root has the first
 };
 

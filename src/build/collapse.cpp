@@ -140,11 +140,14 @@ private:
     Plan out_;
 };
 
-/// Stores the triangles of kBlockSize items; nothing hits the other lanes.
+/// Stores the triangles of kBlockSize items; nothing hits the other lanes. Each is written once.
 void fill_block(TriangleBlock& block, const std::uint32_t* ids, MeshView mesh) {
-    block = make_empty_block();
     for (std::size_t lane = 0; lane < kBlockSize; ++lane) {
-        if (ids[lane] != kNoId) put_triangle(block, lane, mesh, ids[lane]);
+        if (ids[lane] != kNoId) {
+            put_triangle(block, lane, mesh, ids[lane]);
+        } else {
+            put_nothing(block, lane);
+        }
     }
 }
 

@@ -77,15 +77,6 @@ CellRange GridSpace::range_of(const Bounds3f& box) const noexcept {
     return out;
 }
 
-Bounds3f GridSpace::box_of(const CellRange& range) const noexcept {
-    Bounds3f out;
-    for (int a = 0; a < 3; ++a) {
-        out.lower[a] = plane(a, range.first[a]);
-        out.upper[a] = plane(a, range.last[a] + 1);
-    }
-    return out;
-}
-
 CellRange GridSpace::cell_of(std::uint32_t id) const noexcept {
     CellRange out;
     std::uint32_t brick = id / 64;

@@ -59,7 +59,14 @@ public:
     /// reaches into the one that more of it is in; if it lies in the face, into the upper one.
     [[nodiscard]] CellRange range_of(const Bounds3f& box) const noexcept;
     /// The box of the cells together.
-    [[nodiscard]] Bounds3f box_of(const CellRange& range) const noexcept;
+    [[nodiscard]] Bounds3f box_of(const CellRange& range) const noexcept {
+        Bounds3f out;
+        for (int a = 0; a < 3; ++a) {
+            out.lower[a] = plane(a, range.first[a]);
+            out.upper[a] = plane(a, range.last[a] + 1);
+        }
+        return out;
+    }
     /// The number of a cell: 64 times that of its brick, and its bit.
     [[nodiscard]] std::uint32_t cell_id(int x, int y, int z) const noexcept {
         return id_of_[0][static_cast<std::size_t>(x)] + id_of_[1][static_cast<std::size_t>(y)] +

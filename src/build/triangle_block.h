@@ -27,4 +27,14 @@ inline void put_triangle(TriangleBlock& block, std::size_t lane, MeshView mesh,
     block.prim_id[lane] = static_cast<std::int32_t>(id);
 }
 
+/// Makes the lane one that nothing hits.
+inline void put_nothing(TriangleBlock& block, std::size_t lane) noexcept {
+    for (int c = 0; c < 3; ++c) {
+        for (int a = 0; a < 3; ++a) {
+            block.v[c][a][lane] = std::numeric_limits<float>::quiet_NaN();
+        }
+    }
+    block.prim_id[lane] = -1;
+}
+
 }  // namespace packet
