@@ -4,6 +4,8 @@
 #include "generate.h"
 #include "test_rays.h"
 
+#include <packet/packet.h>
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -16,6 +18,12 @@ using namespace packet::test;
 namespace {
 
 int class_of(const Ray& ray) { return direction_class(ray.dir.x, ray.dir.y, ray.dir.z); }
+
+std::vector<std::uint32_t> order_of(std::span<const Ray> rays, int threads) {
+    std::vector<std::uint32_t> out(rays.size());
+    sort_many(rays, out, 0, Parallel(threads));
+    return out;
+}
 
 }  // namespace
 
@@ -53,17 +61,40 @@ TEST_CASE("many rays are sorted as few are, by any number of threads") {
         const std::vector<Ray> rays = random_rays(world, count, 5);
         StreamOrder order;
         for (const int threads : {1, 2}) {
-            CHECK(std::ranges::equal(order_of_many(rays, Parallel(threads)), order.sort(rays)));
+            CHECK(std::ranges::equal(order_of(rays, threads), order.sort(rays)));
         }
     }
     const std::vector<Ray> rays = random_rays(world, 200'000, 5);
-    const auto sorted = order_of_many(rays, Parallel(2));
-    CHECK(std::ranges::equal(sorted, order_of_many(rays, Parallel(1))));
-    std::vector<std::uint32_t> all(sorted.begin(), sorted.end()), want(rays.size());
+    std::vector<std::uint32_t> all = order_of(rays, 2), want(rays.size());
+    CHECK(all == order_of(rays, 1));
     CHECK(std::ranges::is_sorted(all, {}, [&](auto i) { return class_of(rays[i]); }));
     std::ranges::sort(all);
     std::iota(want.begin(), want.end(), 0u);
     CHECK(all == want);
+}
+
+TEST_CASE("scattered rays, sorted together, get their own hits") {
+    Scene scene = make_scene(tools::make_city(3000, 3));
+    scene.commit();
+    const std::vector<Ray> rays = random_rays(scene.bounds(), 5 * StreamOrder::kMostRays + 7, 9);
+    std::vector<Hit> want(rays.size()), got(rays.size());
+    std::vector<std::uint8_t> occluded(rays.size());
+    TraceOptions options;
+    options.mode = Mode::kSingle;
+    trace_closest(scene, rays, want, options);
+    for (const Mode mode : {Mode::kStream, Mode::kAuto}) {
+        options.mode = mode;
+        for (options.threads = 1; options.threads <= 2; ++options.threads) {
+            std::ranges::fill(got, Hit{});
+            trace_closest(scene, rays, got, options);
+            CHECK(got == want);
+            std::ranges::fill(occluded, std::uint8_t{2});
+            trace_any(scene, rays, occluded, options);
+            CHECK(std::ranges::equal(
+                occluded, want, {}, [](auto o) { return o != 0; },
+                [](const Hit& hit) { return hit.is_hit(); }));
+        }
+    }
 }
 
 TEST_CASE("rays that follow each other start near each other") {

@@ -217,7 +217,7 @@ private:
 };
 
 /// The tree over one reference, or none.
-Hierarchy build_trivial(ScratchVector<Reference> references) {
+Hierarchy build_trivial(const ScratchVector<Reference>& references) {
     Hierarchy out;
     for (const Reference& r : references) out.nodes.push_back({r.bounds(), 0, 0, 1});
     for (const Reference& r : references) out.ids.push_back(r.id);
@@ -237,7 +237,7 @@ int chosen_morton_bits(std::size_t references, const BuildOptions& options) {
 
 Hierarchy build_bvh_morton(ScratchVector<Reference> references, const BuildOptions& options,
                            const Parallel& parallel) {
-    if (references.size() < 2) return build_trivial(std::move(references));
+    if (references.size() < 2) return build_trivial(references);
     const int bits = chosen_morton_bits(references.size(), options);
     Hierarchy out;
     parallel.run([&] {

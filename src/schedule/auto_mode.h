@@ -13,4 +13,8 @@ namespace packet {
 /// most runs start close together and go the same way, single rays else. O(1).
 [[nodiscard]] Mode choose_mode(std::span<const Ray> rays, const Bounds3f& world);
 
+/// Whether neighbours start anywhere, judged from as many: only rays that come later, if any,
+/// start near them. O(1).
+[[nodiscard]] bool are_scattered(std::span<const Ray> rays, const Bounds3f& world);
+
 }  // namespace packet

@@ -21,6 +21,15 @@ RayTasks RayTasks::sorted(std::span<const Ray> rays, int threads) {
     return out;
 }
 
+void RayTasks::sort_together(const Parallel& parallel) {
+    order_.resize(rays_.size());
+    for (std::size_t first = 0; first < rays_.size(); first += kMostSortedTogether) {
+        const std::size_t count = std::min(kMostSortedTogether, rays_.size() - first);
+        sort_many(rays_.subspan(first, count), std::span(order_).subspan(first, count),
+                  static_cast<std::uint32_t>(first), parallel);
+    }
+}
+
 std::size_t RayTasks::count() const {
     return image_.is_image() ? image_.tile_count() : (rays_.size() + run_length_ - 1) / run_length_;
 }
@@ -30,7 +39,10 @@ void RayTasks::run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch
     std::unique_ptr<StreamOrder> sorted;
     std::size_t first = task * run_length_;
     batch.count = std::min(run_length_, rays_.size() - std::min(first, rays_.size()));
-    if (image_.is_image()) {
+    if (!order_.empty()) {
+        batch.order = order_.data() + first;
+        first = 0;
+    } else if (image_.is_image()) {
         first = image_.first_ray(task);
         batch.count = image_.fill(task, pixels);
         batch.order = pixels.data();

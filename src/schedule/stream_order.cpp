@@ -117,7 +117,9 @@ std::span<const std::uint32_t> StreamOrder::sort(std::span<const Ray> rays) {
     return items_;
 }
 
-ScratchVector<std::uint32_t> order_of_many(std::span<const Ray> rays, const Parallel& parallel) {
+void sort_many(std::span<const Ray> rays, std::span<std::uint32_t> out, std::uint32_t first,
+               const Parallel& parallel) {
+    PACKET_ASSERT(out.size() == rays.size());
     constexpr std::size_t kGrain = 65536;  // 100 us or more
     struct Item {
         std::uint32_t key, index;
@@ -126,17 +128,15 @@ ScratchVector<std::uint32_t> order_of_many(std::span<const Ray> rays, const Para
     ScratchVector<Item> items(rays.size()), scratch(rays.size());
     parallel.for_pieces(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            items[i] = {key_of(rays[i], cells), static_cast<std::uint32_t>(i)};
+            items[i] = {key_of(rays[i], cells), first + static_cast<std::uint32_t>(i)};
         }
     });
     const std::span<const Item> sorted =
         radix_sort(std::span<Item>(items), std::span<Item>(scratch), kKeyBits, parallel,
                    [](const Item& item) { return item.key; });
-    ScratchVector<std::uint32_t> out(rays.size());
     parallel.for_pieces(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) out[i] = sorted[i].index;
     });
-    return out;
 }
 
 std::unique_ptr<StreamOrder> StreamOrders::take() {

@@ -36,8 +36,8 @@ public:
           rays_(rays),
           parallel_(options.threads, progress),
           plan_(make_plan(scene_, rays, query, options.mode)),
-          tasks_(plan_.is_sorted ? RayTasks::sorted(rays, parallel_.threads())
-                                 : RayTasks(rays, options.width)),
+          tasks_(plan_.sorting != Sorting::kNone ? RayTasks::sorted(rays, parallel_.threads())
+                                                 : RayTasks(rays, options.width)),
           tries_(plan_.is_trial && tasks_.count() >= kLeastTasksForTrial) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
@@ -55,9 +55,8 @@ public:
 
     /// As many rays at a time as are sorted together: the more, the more wait at a treelet.
     void run_by_treelets(KernelTable::Treelet kernel, Hit* hits, std::uint8_t* occluded) const {
-        constexpr std::size_t kMostRays = std::size_t{1} << 22;  // 80 MB to sort, then 16
-        for (std::size_t first = 0; first < rays_.size(); first += kMostRays) {
-            const std::size_t count = std::min(kMostRays, rays_.size() - first);
+        for (std::size_t first = 0; first < rays_.size(); first += kMostSortedTogether) {
+            const std::size_t count = std::min(kMostSortedTogether, rays_.size() - first);
             const TraceBatch batch{&scene_.view,
                                    rays_.data() + first,
                                    nullptr,
@@ -69,12 +68,13 @@ public:
         }
     }
 
-    void run(const Kernels& kernels, Hit* hits, std::uint8_t* occluded) const {
+    void run(const Kernels& kernels, Hit* hits, std::uint8_t* occluded) {
         const TraceBatch batch{&scene_.view, nullptr, nullptr, 0, hits, occluded, nullptr};
         const auto counting =
             options_.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
         const auto kernel = [&](KernelTable::Kernel which) { return kernels[which][counting]; };
         parallel_.run([&] {
+            if (plan_.sorting == Sorting::kTogether) tasks_.sort_together(parallel_);
             const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : plan_.kernel;
             parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
                 if (!is_trial(task)) run_task(task, kernel(best), batch);
@@ -86,7 +86,8 @@ public:
 private:
     /// Each thread has its own queues and takes rays as long as there are any.
     void run_queues(const TraceBatch& batch, KernelTable::Treelet kernel) const {
-        const auto order = order_of_many({batch.rays, batch.count}, parallel_);
+        ScratchVector<std::uint32_t> order(batch.count);
+        sort_many({batch.rays, batch.count}, order, 0, parallel_);
         clear(batch);  // kernels write where something is hit
         const auto threads = static_cast<std::size_t>(parallel_.threads());
         const TreeletJob job{batch,
@@ -189,7 +190,8 @@ void trace_span(const Scene& scene, std::span<const Ray> rays, TraceQuery query,
         options.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
     with_progress(options.progress, "tracing", [&](Progress& progress) {
         progress.start_phase(1.0);
-        run(SpanTrace(scene, rays, query, options, progress), counting);
+        SpanTrace trace(scene, rays, query, options, progress);
+        run(trace, counting);
         return 0;
     });
 }
@@ -206,21 +208,20 @@ void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit>
                    const TraceOptions& options) {
     check_sizes(rays.size(), hits.size(), "hits");
     const KernelTable& kernels = select_kernels(options.isa);
-    trace_span(
-        scene, rays, TraceQuery::kClosest, options, [&](const SpanTrace& trace, auto counting) {
-            if (trace.goes_by_treelets()) {
-                trace.run_by_treelets(kernels.closest_treelet[counting], hits.data(), nullptr);
-            } else {
-                trace.run(kernels.closest, hits.data(), nullptr);
-            }
-        });
+    trace_span(scene, rays, TraceQuery::kClosest, options, [&](SpanTrace& trace, auto counting) {
+        if (trace.goes_by_treelets()) {
+            trace.run_by_treelets(kernels.closest_treelet[counting], hits.data(), nullptr);
+        } else {
+            trace.run(kernels.closest, hits.data(), nullptr);
+        }
+    });
 }
 
 void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size(), "results");
     const KernelTable& kernels = select_kernels(options.isa);
-    trace_span(scene, rays, TraceQuery::kAny, options, [&](const SpanTrace& trace, auto counting) {
+    trace_span(scene, rays, TraceQuery::kAny, options, [&](SpanTrace& trace, auto counting) {
         if (trace.goes_by_treelets()) {
             trace.run_by_treelets(kernels.any_treelet[counting], nullptr, occluded.data());
         } else {

@@ -2,6 +2,7 @@
 
 #include "schedule/auto_mode.h"
 #include "schedule/ray_tasks.h"
+#include "schedule/stream_order.h"
 
 namespace packet {
 
@@ -29,13 +30,24 @@ bool has_treelets(const SceneView& scene) {
     return has_one_tree(scene) && scene.instances[0].tree->treelet_count != 0;
 }
 
-TracePlan plan_as_asked(const SceneView& scene, Mode mode) {
-    if (mode == Mode::kTreelet) {
-        if (has_treelets(scene)) return {.kernel = KernelTable::kStream, .by_treelets = true};
-        mode = Mode::kStream;
+TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
+    // Fewer fill not much more than one task does.
+    constexpr std::size_t kLeastTogether = 4 * StreamOrder::kMostRays;
+    constexpr std::size_t kMostTogether = 0xFFFFFFFF;
+    const bool together = rays.size() >= kLeastTogether && rays.size() <= kMostTogether &&
+                          are_scattered(rays, scene.top.bounds);
+    return {KernelTable::kStream, together ? Sorting::kTogether : Sorting::kByTask};
+}
+
+TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode) {
+    if (mode == Mode::kTreelet && has_treelets(scene.view)) {
+        return {.kernel = KernelTable::kStream, .by_treelets = true};
     }
-    if (mode == Mode::kStream && !has_one_tree(scene)) return {.kernel = KernelTable::kSingle};
-    return {kernel_of(mode), mode == Mode::kStream};
+    if (mode == Mode::kTreelet || mode == Mode::kStream) {
+        if (!has_one_tree(scene.view)) return {KernelTable::kSingle};
+        return plan_streams(scene, rays);
+    }
+    return {kernel_of(mode)};
 }
 
 /// As the rays and the query suggest: docs/benchmarking.md#beside-embree.
@@ -43,11 +55,12 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
     const bool may_stream = rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
     const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
     if (may_stream && query == TraceQuery::kAny) {
-        return {is_coherent ? KernelTable::kSorted : KernelTable::kStream, true};
+        if (is_coherent) return {KernelTable::kSorted, Sorting::kByTask};
+        return plan_streams(scene, rays);
     }
-    if (is_coherent) return {KernelTable::kTile, false};
-    if (may_stream) return {KernelTable::kStream, true};
-    return {KernelTable::kSingle, false, true};
+    if (is_coherent) return {KernelTable::kTile};
+    if (may_stream) return plan_streams(scene, rays);
+    return {.kernel = KernelTable::kSingle, .is_trial = true};
 }
 
 }  // namespace
@@ -55,7 +68,7 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
 TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
                     Mode mode) {
     return mode == Mode::kAuto ? plan_by_looks(scene, rays, query)
-                               : plan_as_asked(scene.view, mode);
+                               : plan_as_asked(scene, rays, mode);
 }
 
 }  // namespace packet

@@ -12,9 +12,16 @@ namespace packet {
 
 enum class TraceQuery { kClosest, kAny };
 
+/// How rays are sorted before they are traced.
+enum class Sorting {
+    kNone,
+    kByTask,   ///< each task its own: as soon as they are needed
+    kTogether  ///< by millions: where neighbours are scattered, those that belong together are far
+};
+
 struct TracePlan {
     KernelTable::Kernel kernel;
-    bool is_sorted = false;    ///< whether the rays are sorted first
+    Sorting sorting = Sorting::kNone;
     bool is_trial = false;     ///< whether packets are tried, too
     bool by_treelets = false;  ///< by kernels of their own
 };
