@@ -29,10 +29,8 @@ inline void put_triangle(TriangleBlock& block, std::size_t lane, MeshView mesh,
 
 /// Makes the lane one that nothing hits.
 inline void put_nothing(TriangleBlock& block, std::size_t lane) noexcept {
-    for (int c = 0; c < 3; ++c) {
-        for (int a = 0; a < 3; ++a) {
-            block.v[c][a][lane] = std::numeric_limits<float>::quiet_NaN();
-        }
+    for (auto& corner : block.v) {
+        for (auto& coordinate : corner) coordinate[lane] = std::numeric_limits<float>::quiet_NaN();
     }
     block.prim_id[lane] = -1;
 }
