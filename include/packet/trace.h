@@ -22,7 +22,8 @@ enum class Mode : std::uint8_t {
     kPacket8,   ///< 8 rays share one stack
     kPacket16,  ///< 16 rays share one stack
     kTile,      ///< up to 128 rays share one stack and a beam around them, as far as they cohere
-    kStream,    ///< incoherent rays by the thousand: sorted, then up to 64 share one stack
+    kStream,    ///< incoherent rays by the thousand: sorted, then up to 64 share one stack. From
+                ///< 131,072 rays on that start anywhere, sorting takes 4 bytes a ray and 64 MB
     kTreelet    ///< incoherent rays by the million in scenes far larger than the cache: each waits
                 ///< at the part of the tree it enters next until there are many. Where the scene is
                 ///< not one tree, or not cut into treelets, as kStream
