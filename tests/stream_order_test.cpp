@@ -1,5 +1,6 @@
 // What streams rely on: all rays once, each class in one run, neighbours near each other.
 #include "schedule/stream_order.h"
+#include "configurations.h"
 #include "core/direction_class.h"
 #include "generate.h"
 #include "test_rays.h"
@@ -90,6 +91,37 @@ TEST_CASE("scattered rays, sorted together, get their own hits") {
             CHECK(got == want);
             std::ranges::fill(occluded, std::uint8_t{2});
             trace_any(scene, rays, occluded, options);
+            CHECK(std::ranges::equal(
+                occluded, want, {}, [](auto o) { return o != 0; },
+                [](const Hit& hit) { return hit.is_hit(); }));
+        }
+    }
+}
+
+TEST_CASE("streams that take steps in turn, in a tree beyond the cache, find the same") {
+    const Scene scene = [] {
+        Scene out = make_scene(tools::make_city(200'000, 3));
+        out.commit();
+        return out;
+    }();
+    // kLeastBytesForTurns of kernels/stream_batch.h
+    REQUIRE(scene.build_stats().bytes > std::size_t{8} << 20);
+    const std::vector<Ray> all = random_rays(scene.bounds(), 20'001, 9);
+    // No ray, fewer streams than take turns, and streams that begin while others go on.
+    for (const std::size_t count : {std::size_t{0}, std::size_t{5}, std::size_t{300}, all.size()}) {
+        const std::span<const Ray> rays = std::span(all).first(count);
+        std::vector<Hit> want(count);
+        TraceOptions single;
+        single.mode = Mode::kSingle;
+        trace_closest(scene, rays, want, single);
+        for (const Configuration& by : all_configurations(AccelKind::kBvh)) {
+            if (by.mode != Mode::kStream) continue;
+            CAPTURE(by.name());
+            std::vector<Hit> got(count);
+            trace_closest(scene, rays, got, by.trace_options());
+            CHECK(count_differences(rays, want, got) == 0);
+            std::vector<std::uint8_t> occluded(count, 2);
+            trace_any(scene, rays, occluded, by.trace_options());
             CHECK(std::ranges::equal(
                 occluded, want, {}, [](auto o) { return o != 0; },
                 [](const Hit& hit) { return hit.is_hit(); }));

@@ -91,6 +91,7 @@ TreeView Tree::view() const noexcept {
     }
     out.grid = grid.view();
     out.node_count = static_cast<std::uint32_t>(nodes.empty() ? wide_nodes.size() : nodes.size());
+    out.byte_count = wide_nodes.size() * sizeof(WideNode) + blocks.size() * sizeof(TriangleBlock);
     for (int a = 0; a < 3 && !out.is_empty(); ++a) {
         out.lower[a] = bounds.lower[a];
         out.upper[a] = bounds.upper[a];

@@ -110,6 +110,7 @@ struct TreeView {
     const WideNode* wide_nodes = nullptr;
     const TriangleBlock* blocks = nullptr;
     std::uint32_t node_count = 0;  ///< of wide ones if there are no others
+    std::uint64_t byte_count = 0;  ///< of wide nodes and blocks
     /// Treelet t is wide nodes treelet_begin[t] to treelet_begin[t + 1], the first one its root;
     /// links that leave it lead to roots. No treelets: the tree is not cut.
     std::uint32_t treelet_count = 0;

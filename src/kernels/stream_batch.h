@@ -19,15 +19,22 @@ PACKET_INLINE int class_run(const float* const* dir, int most) {
 
 /// Fills a stream with the first `count` rays, which are of one class.
 template <class Isa>
-PACKET_INLINE void load_stream(StreamRays<Isa>& out, const TreeView& tree, const RayColumns& rays,
+PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, const RayColumns& rays,
                                int count, std::int32_t instance_id) {
-    out.active = 0;
+    out.rays.active = 0;
     for (int first = 0; first < count; first += kSingleLanes) {
         const LoadedRays<kSingleLanes, Isa> loaded(rays.from(first),
                                                    lanes_below<kSingleLanes>(count, first));
-        out.load(tree, loaded.ray, loaded.active.bits(), first, instance_id);
+        out.rays.load(tree, loaded.ray, loaded.active.bits(), first, instance_id);
     }
+    out.looking = out.rays.active;
 }
+
+/// Streams that take steps in turn: what one of them fetches arrives while the others walk.
+/// Measured: docs/benchmarking.md#streams.
+inline constexpr int kStreamsInTurn = 8;
+/// Smaller trees stay in the cache, where there is nothing to wait for.
+inline constexpr std::uint64_t kLeastBytesForTurns = 8 << 20;
 
 template <Query query, class Isa, class Stats>
 class StreamBatch {
@@ -41,31 +48,71 @@ public:
 
     /// The rays from `begin` on.
     PACKET_INLINE void trace(std::size_t begin) {
-        while (begin < batch_.count) {
-            const std::size_t left = batch_.count - begin;
-            const int most = left < kStreamRays ? static_cast<int>(left) : kStreamRays;
-            const RayColumns columns = gather_rays(batch_, begin, most, gathered_);
-            const int count = class_run(columns.component + 4, most);
-            prefetch_rays(batch_, begin + static_cast<std::size_t>(count), kStreamRays);
-            trace_stream(columns, begin, count);
-            begin += static_cast<std::size_t>(count);
+        next_ = begin;
+        if (tree_.byte_count < kLeastBytesForTurns) {
+            trace_one_by_one();
+        } else {
+            trace_in_turn();
         }
     }
 
 private:
-    PACKET_INLINE void trace_stream(const RayColumns& columns, std::size_t begin, int count) {
-        load_stream(rays_, tree_, columns, count, instance_id_);
-        walk_.run(rays_);
-        for (int i = 0; i < count; ++i) store_hits(rays_.best[i], hits_, i);
-        scatter_hits<query>(batch_, begin, count, hits_);
+    /// A stream, and which rays it has: `count` from `begin` on.
+    struct Turn {
+        Stream<Isa> stream;
+        std::size_t begin = 0;
+        int count = 0;
+    };
+
+    PACKET_INLINE void trace_one_by_one() {
+        Turn& turn = turns_[0];
+        WholeTree all;
+        while (start(turn)) {
+            while (walk_.step(turn.stream, all)) {
+            }
+            finish(turn);
+        }
+    }
+    PACKET_INLINE void trace_in_turn() {
+        int walking = 0;
+        for (Turn& turn : turns_) walking += start(turn) ? 1 : 0;
+        WholeTree all;
+        while (walking != 0) {
+            for (Turn& turn : turns_) {
+                if (turn.count == 0 || walk_.step(turn.stream, all)) continue;
+                finish(turn);
+                if (!start(turn)) --walking;
+            }
+        }
+    }
+
+    /// The next rays' stream; false if there are none left.
+    PACKET_INLINE bool start(Turn& turn) {
+        turn.begin = next_;
+        turn.count = 0;
+        if (next_ >= batch_.count) return false;
+        const std::size_t left = batch_.count - next_;
+        const int most = left < kStreamRays ? static_cast<int>(left) : kStreamRays;
+        const RayColumns columns = gather_rays(batch_, next_, most, gathered_);
+        turn.count = class_run(columns.component + 4, most);
+        next_ += static_cast<std::size_t>(turn.count);
+        prefetch_rays(batch_, next_, kStreamRays);
+        load_stream(turn.stream, tree_, columns, turn.count, instance_id_);
+        walk_.start(turn.stream, 0, turn.stream.looking);
+        return true;
+    }
+    PACKET_INLINE void finish(const Turn& turn) {
+        for (int i = 0; i < turn.count; ++i) store_hits(turn.stream.rays.best[i], hits_, i);
+        scatter_hits<query>(batch_, turn.begin, turn.count, hits_);
     }
 
     const TraceBatch& batch_;
     const TreeView& tree_;
     std::int32_t instance_id_;
     Stats stats_;
-    StreamRays<Isa> rays_;
     StreamWalk<query, Isa, Stats> walk_;
+    std::size_t next_ = 0;  ///< the first ray that is in no stream yet
+    Turn turns_[kStreamsInTurn];
     RayArrays<kStreamRays, Isa> gathered_ = {};
     HitArrays<kStreamRays, Isa> hits_;
 };

@@ -96,6 +96,23 @@ private:
     }
 };
 
+/// A subtree to visit, by the rays that met its box. None enters it before `enter`.
+struct StreamEntry {
+    WideChild child;
+    RaySet rays;
+    float enter;
+};
+
+/// A stream on its way through a tree.
+template <class Isa>
+struct Stream {
+    StreamRays<Isa> rays;
+    RaySet looking = 0;  ///< rays that may still find something
+    int size = 0;
+    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
+    StreamEntry stack[kMaxDepth * (kWideSize - 1) + kWideSize];
+};
+
 /// Where streams that walk all of a tree may go. Other parts keep what `rays` would enter beyond
 /// them: a node, and `enter` before which none does.
 struct WholeTree {
@@ -103,51 +120,50 @@ struct WholeTree {
     static constexpr void leave(std::uint32_t, RaySet, float) {}
 };
 
-template <Query query, class Isa, class Stats, class Part = WholeTree>
+/// How streams walk a tree.
+template <Query query, class Isa, class Stats>
 class StreamWalk {
 public:
     PACKET_INLINE StreamWalk(const TreeView& tree, std::int32_t instance_id, Stats& stats)
         : tree_(tree), instance_id_(instance_id), stats_(stats) {}
 
-    /// Walks the tree with all active rays.
-    PACKET_INLINE void run(StreamRays<Isa>& rays) {
-        Part all;
-        look_with(rays.active);
-        walk(rays, 0, rays.active, all);
+    /// Enters the subtree of a node with those of `entering` that are looking.
+    PACKET_INLINE void start(Stream<Isa>& stream, std::uint32_t root, RaySet entering) const {
+        entering &= stream.looking;
+        if (entering != 0) visit(stream, tree_.wide_nodes[root], entering);
     }
-    PACKET_INLINE void look_with(RaySet rays) { looking_ = rays; }
-    PACKET_INLINE RaySet looking() const { return looking_; }
-
-    /// Walks what is below a node in the part, with those of `entering` that are looking.
-    PACKET_INLINE void walk(StreamRays<Isa>& rays, std::uint32_t root, RaySet entering,
-                            Part& part) {
-        entering &= looking_;
-        if (entering == 0) return;
-        visit(rays, tree_.wide_nodes[root], entering);
-        while (size_ != 0) {
-            const Entry& top = stack_[--size_];
-            const RaySet active = top.rays & looking_;
-            if (active == 0) continue;
-            if (top.child.is_leaf()) {
-                meet_leaf(rays, {top.child.link, top.child.count}, active, top.enter);
-            } else if (!part.holds(top.child.link)) {
-                part.leave(top.child.link, active, top.enter);
-            } else {
-                visit(rays, tree_.wide_nodes[top.child.link], active);
-            }
+    /// Visits what is on top of the stack; false if there is nothing. What it pushes is fetched,
+    /// and arrives while other streams take their steps.
+    template <class Part>
+    PACKET_INLINE bool step(Stream<Isa>& stream, Part& part) const {
+        RaySet active = 0;
+        const StreamEntry* top = nullptr;
+        while (active == 0) {
+            if (stream.size == 0) return false;
+            top = &stream.stack[--stream.size];
+            active = top->rays & stream.looking;
+        }
+        if (top->child.is_leaf()) {
+            meet_leaf(stream, {top->child.link, top->child.count}, active, top->enter);
+        } else if (!part.holds(top->child.link)) {
+            part.leave(top->child.link, active, top->enter);
+        } else {
+            visit(stream, tree_.wide_nodes[top->child.link], active);
+        }
+        return true;
+    }
+    /// Walks what is below a node in the part.
+    template <class Part>
+    PACKET_INLINE void walk(Stream<Isa>& stream, std::uint32_t root, RaySet entering,
+                            Part& part) const {
+        start(stream, root, entering);
+        while (step(stream, part)) {
         }
     }
 
 private:
     using F = Float<kWideSize, Isa>;
     using I = Int<kWideSize, Isa>;
-
-    /// A subtree to visit, by the rays that met its box. None enters it before `enter`.
-    struct Entry {
-        WideChild child;
-        RaySet rays;
-        float enter;
-    };
 
     /// The planes of a node's children, in the order in which they are met.
     struct NodePlanes {
@@ -174,15 +190,15 @@ private:
         }
     };
 
-    PACKET_INLINE void visit(const StreamRays<Isa>& rays, const WideNode& node, RaySet active) {
+    PACKET_INLINE void visit(Stream<Isa>& stream, const WideNode& node, RaySet active) const {
         stats_.visit(__builtin_popcountll(active), __builtin_popcountll(active));
-        const NodePlanes planes(node, rays.near_side);
+        const NodePlanes planes(node, stream.rays.near_side);
         I found[2] = {I(0), I(0)};
         F first_enter(__builtin_huge_valf());
         for (RaySet left = active; left != 0; left &= left - 1) {
             const int r = __builtin_ctzll(left);
             F enter;
-            const auto meets = planes.meets(rays.ray[r], enter);
+            const auto meets = planes.meets(stream.rays.ray[r], enter);
             for (int i = 0; i < 2; ++i) {
                 found[i] = found[i] | select(meets, I(bits_.half[r][i]), I(0));
             }
@@ -191,47 +207,48 @@ private:
             }
         }
         const std::uint32_t all = (1u << kWideSize) - 1;
-        push(node, all & ~((found[0] | found[1]) == I(0)).bits(), found, first_enter);
+        push(stream, node, all & ~((found[0] | found[1]) == I(0)).bits(), found, first_enter);
     }
 
     /// Pushes the children of `bits`, for closest-hit the one that is entered first last. Any-hit
     /// takes them as they come.
-    PACKET_INLINE void push(const WideNode& node, std::uint32_t bits, const I (&found)[2],
-                            const F& first_enter) {
+    PACKET_INLINE void push(Stream<Isa>& stream, const WideNode& node, std::uint32_t bits,
+                            const I (&found)[2], const F& first_enter) const {
         if (bits == 0) return;
         std::int32_t half[2][kWideSize];
         found[0].store(half[0]), found[1].store(half[1]);
         float enter[kWideSize];
         first_enter.store(enter);
-        const int bottom = size_;
+        const int bottom = stream.size;
         for (; bits != 0; bits &= bits - 1) {
             const int child = __builtin_ctz(bits);
             const RaySet set = static_cast<std::uint32_t>(half[0][child]) |
                                RaySet{static_cast<std::uint32_t>(half[1][child])} << 32;
             prefetch(tree_, node.child[child]);
-            int place = size_++;
+            int place = stream.size++;
             if constexpr (query == Query::kClosest) {
-                for (; place > bottom && stack_[place - 1].enter < enter[child]; --place) {
-                    stack_[place] = stack_[place - 1];
+                for (; place > bottom && stream.stack[place - 1].enter < enter[child]; --place) {
+                    stream.stack[place] = stream.stack[place - 1];
                 }
             }
-            stack_[place] = {node.child[child], set, enter[child]};
+            stream.stack[place] = {node.child[child], set, enter[child]};
         }
     }
 
-    PACKET_INLINE void meet_leaf(StreamRays<Isa>& rays, BlockRange range, RaySet active,
-                                 float enter) {
+    PACKET_INLINE void meet_leaf(Stream<Isa>& stream, BlockRange range, RaySet active,
+                                 float enter) const {
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            for (RaySet left = active & looking_; left != 0; left &= left - 1) {
+            for (RaySet left = active & stream.looking; left != 0; left &= left - 1) {
                 const int r = __builtin_ctzll(left);
-                if (query == Query::kClosest && enter > rays.ray[r].best_t) continue;
+                if (query == Query::kClosest && enter > stream.rays.ray[r].best_t) continue;
                 stats_.triangles(__builtin_popcount(range.lanes(b)));
-                meet_ray(rays, r, tree_.blocks[b]);
+                meet_ray(stream, r, tree_.blocks[b]);
             }
         }
     }
 
-    PACKET_INLINE void meet_ray(StreamRays<Isa>& rays, int r, const TriangleBlock& block) {
+    PACKET_INLINE void meet_ray(Stream<Isa>& stream, int r, const TriangleBlock& block) const {
+        StreamRays<Isa>& rays = stream.rays;
         StreamRay& ray = rays.ray[r];
         ShearRays<kBlockSize, Isa> shear;
         for (int a = 0; a < 3; ++a) {
@@ -244,7 +261,7 @@ private:
             BestHits<1, Isa>& best = rays.best[r];
             best.template update<query>(hit, instance_id_);
             ray.best_t = best.t.r[0];
-            if (query == Query::kAny) looking_ &= ~(RaySet{1} << r);
+            if (query == Query::kAny) stream.looking &= ~(RaySet{1} << r);
         });
     }
 
@@ -252,10 +269,6 @@ private:
     std::int32_t instance_id_;
     Stats& stats_;
     const RayBits bits_;
-    RaySet looking_ = 0;  ///< rays that may still find something
-    int size_ = 0;
-    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
-    Entry stack_[kMaxDepth * (kWideSize - 1) + kWideSize];
 };
 
 }  // namespace packet

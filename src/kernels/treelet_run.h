@@ -50,7 +50,7 @@ public:
 
 private:
     PACKET_INLINE void load(const RayColumns& columns, std::size_t begin, int count) {
-        load_stream(rays_, tree_, columns, count, instance_id_);
+        load_stream(stream_, tree_, columns, count, instance_id_);
         stats_.treelet_stream(count);
         for (int r = 0; r < count; ++r) {
             ray_[r] = batch_.rays.order[begin + static_cast<std::size_t>(r)];
@@ -62,17 +62,16 @@ private:
             // Needed once the ray has left, and anywhere in memory.
             if (pending_[r] != kNoSlot) __builtin_prefetch(queues_.slots + pending_[r], 1);
             if (batch_.prim_id[at] < 0) continue;
-            rays_.best[r].prim_id = batch_.prim_id[at];
-            rays_.best[r].tie_prim_id = batch_.prim_id[at];
-            rays_.best[r].instance_id = instance_id_;
+            stream_.rays.best[r].prim_id = batch_.prim_id[at];
+            stream_.rays.best[r].tie_prim_id = batch_.prim_id[at];
+            stream_.rays.best[r].instance_id = instance_id_;
         }
     }
 
     PACKET_INLINE void run_stream() {
         const std::uint32_t root = tree_.treelet_begin[batch_.treelet];
         OneTreelet part{root, tree_.treelet_begin[batch_.treelet + 1] - root, batch_.exits};
-        walk_.look_with(rays_.active);
-        walk_.walk(rays_, root, rays_.active, part);
+        walk_.walk(stream_, root, stream_.rays.active, part);
         std::uint32_t exits = 0;
         for (int e = 0; e < part.exit_count; ++e) {
             exits += static_cast<std::uint32_t>(__builtin_popcountll(batch_.exits[e].rays));
@@ -85,7 +84,7 @@ private:
                 walk_all(batch_.exits[e].node, batch_.exits[e].rays);
             }
         }
-        for (RaySet left = rays_.active; left != 0; left &= left - 1) {
+        for (RaySet left = stream_.rays.active; left != 0; left &= left - 1) {
             go_on(__builtin_ctzll(left));
         }
     }
@@ -93,7 +92,7 @@ private:
     /// Without regard to treelets.
     PACKET_NOINLINE void walk_all(std::uint32_t node, RaySet rays) {
         OneTreelet whole;
-        walk_.walk(rays_, node, rays, whole);
+        walk_.walk(stream_, node, rays, whole);
     }
 
     PACKET_INLINE bool reserve(std::uint32_t slots) {
@@ -106,9 +105,9 @@ private:
     /// Notes what rays enter later, if it is not behind what they have hit.
     PACKET_INLINE void postpone(const TreeletExit& exit) {
         const std::uint32_t treelet = tree_.treelet_of_node[exit.node];
-        for (RaySet left = exit.rays & walk_.looking(); left != 0; left &= left - 1) {
+        for (RaySet left = exit.rays & stream_.looking; left != 0; left &= left - 1) {
             const int r = __builtin_ctzll(left);
-            if (query == Query::kClosest && exit.enter > rays_.ray[r].best_t) continue;
+            if (query == Query::kClosest && exit.enter > stream_.rays.ray[r].best_t) continue;
             const std::uint32_t slot = queues_.free_pending;
             PendingTreelet& record = queues_.slots[slot].pending;
             queues_.free_pending = record.next;
@@ -130,8 +129,9 @@ private:
             record.next = queues_.free_pending;
             queues_.free_pending = slot;
             ++queues_.free_pending_count;
-            const bool looks = (walk_.looking() >> r & 1u) != 0;
-            if (!looks || (query == Query::kClosest && next.enter > rays_.ray[r].best_t)) continue;
+            const bool looks = (stream_.looking >> r & 1u) != 0;
+            if (!looks || (query == Query::kClosest && next.enter > stream_.rays.ray[r].best_t))
+                continue;
             if (wait(r, next.treelet)) return;
             walk_all(tree_.treelet_begin[next.treelet], RaySet{1} << r);
         }
@@ -140,11 +140,11 @@ private:
     PACKET_INLINE bool wait(int r, std::uint32_t treelet) {
         QueueTail& tail = queues_.tails[treelet];
         if (tail.next == tail.end && !queues_.add_to_queue(queues_, treelet)) return false;
-        const std::int32_t prim_id = rays_.best[r].prim_id.r[0];
+        const std::int32_t prim_id = stream_.rays.best[r].prim_id.r[0];
         QueuedRay& out = queues_.slots[tail.next++].ray;
         out.ray = ray_[r];
         out.pending = pending_[r];
-        out.best_t = rays_.ray[r].best_t;
+        out.best_t = stream_.rays.ray[r].best_t;
         out.prim_id = prim_id == kNoId ? -1 : prim_id;
         pending_[r] = kNoSlot;
         return true;
@@ -155,12 +155,12 @@ private:
         for (int r = 0; r < count; ++r) {
             const std::size_t at = begin + static_cast<std::size_t>(r);
             const std::int32_t had = batch_.best_t != nullptr ? batch_.prim_id[at] : -1;
-            const std::int32_t has = rays_.best[r].prim_id.r[0];
+            const std::int32_t has = stream_.rays.best[r].prim_id.r[0];
             if (has == kNoId || has == had) continue;
             if constexpr (query == Query::kAny) {
                 batch_.rays.occluded[place(batch_.rays, at)] = 1;
             } else {
-                store_hits(rays_.best[r], hits_, r);
+                store_hits(stream_.rays.best[r], hits_, r);
                 scatter_hit(*batch_.rays.scene, hits_, r, batch_.rays.hits[place(batch_.rays, at)]);
             }
         }
@@ -171,10 +171,10 @@ private:
     const TreeView& tree_;
     std::int32_t instance_id_;
     Stats stats_;
-    StreamRays<Isa> rays_;
+    Stream<Isa> stream_;
     std::uint32_t pending_[kStreamRays];
     std::uint32_t ray_[kStreamRays];
-    StreamWalk<query, Isa, Stats, OneTreelet> walk_;
+    StreamWalk<query, Isa, Stats> walk_;
     RayArrays<kStreamRays, Isa> gathered_ = {};
     HitArrays<kStreamRays, Isa> hits_;
 };
