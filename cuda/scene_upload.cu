@@ -97,6 +97,7 @@ DeviceTree UploadedScene::upload(const TreeView& tree, std::size_t block_count) 
     out.wide_nodes = nullptr;
     out.treelet_count = 0;
     out.treelet_begin = out.treelet_of_node = nullptr;
+    out.treelet_roots = nullptr;
     return out;
 }
 

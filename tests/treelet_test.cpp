@@ -4,15 +4,20 @@
 #include "build/validate_tree.h"
 #include "configurations.h"
 #include "generate.h"
-#include "schedule/treelet_scheduler.h"
+#include "schedule/treelet_order.h"
+#include "schedule/treelet_queues.h"
+#include "schedule/treelet_sweep.h"
 #include "test_rays.h"
 
 #include <packet/packet.h>
 
 #include <doctest/doctest.h>
+#include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -168,10 +173,13 @@ TEST_CASE("what rays and treelets have in common is counted") {
     CHECK(much.rays_per_load() > 50.0);
     CHECK(much.treelet_bytes > much.loads * 256);
     CHECK(much.treelet_bytes <= much.loads * 20000);
-    // All entries but the first of a ray are written and read.
-    CHECK(much.queue_bytes == 2 * sizeof(QueuedRay) * (much.entries - rays.size()));
+    // All entries but the first of a ray are written and read, and so are those that are left out.
+    CHECK(much.queue_bytes > 2 * sizeof(QueuedRay) * (much.entries - rays.size()));
+    CHECK(much.queue_bytes < 4 * sizeof(QueuedRay) * (much.entries - rays.size()));
     CHECK(much.peak_queued > 10000);
-    CHECK(much.peak_queued <= rays.size());
+    CHECK(much.peak_queued < much.queue_bytes / (2 * sizeof(QueuedRay)));
+    // Each treelet once a sweep, and all rays sweep together.
+    CHECK(much.loads < scene.build_stats().treelets.count);
     CHECK(much.stream_utilization() > 0.05);
     CHECK(much.stream_utilization() <= 1.0);
 
@@ -197,6 +205,47 @@ TEST_CASE("scenes that are not one tree, or not cut, are traced all the same") {
     CHECK(stats.treelets.entries != 0);
 }
 
+TEST_CASE("auto sweeps where the tree is beyond the cache and rays pay for fetching it") {
+    constexpr std::size_t kMega = 1'000'000;
+    CHECK(sweeps_beat_streams(kMega, 170 * kMega, 1));
+    CHECK(sweeps_beat_streams(kMega, 170 * kMega, 2));
+    CHECK(!sweeps_beat_streams(kMega, 170 * kMega, 64));
+    CHECK(!sweeps_beat_streams(kMega, 5 * kMega, 1));
+    CHECK(!sweeps_beat_streams(kMega, 10'000 * kMega, 1));
+    // More than are sorted together make no sweep longer.
+    CHECK(!sweeps_beat_streams(100 * kMega, 10'000 * kMega, 1));
+
+    const TriangleMesh mesh = tools::make_terrain(900'000, 1);
+    const auto sweeps = [&](std::optional<std::size_t> treelet_bytes, std::size_t count) {
+        Scene scene = make_scene(mesh);
+        BuildOptions build;
+        build.treelet_bytes = treelet_bytes;
+        scene.commit(build);
+        const auto rays = random_rays(scene.bounds(), count, 9);
+        TraceOptions options;
+        options.threads = 2;
+        options.mode = Mode::kStream;
+        std::vector<Hit> want(count), hits(count);
+        trace_closest(scene, rays, want, options);
+        TraceStats closest, any;
+        options.mode = Mode::kAuto;
+        options.stats = &closest;
+        trace_closest(scene, rays, hits, options);
+        CHECK(count_differences(rays, want, hits) == 0);
+        std::vector<std::uint8_t> occluded(count);
+        options.stats = &any;
+        trace_any(scene, rays, occluded, options);
+        std::size_t wrong = 0;
+        for (std::size_t i = 0; i < count; ++i) wrong += occluded[i] != want[i].is_hit();
+        CHECK(wrong == 0);
+        CHECK((any.treelets.entries != 0) == (closest.treelets.entries != 0));
+        return closest.treelets.entries != 0;
+    };
+    CHECK(sweeps(std::nullopt, 200'000));
+    CHECK(!sweeps(std::nullopt, 100'000));
+    CHECK(!sweeps(0, 200'000));
+}
+
 TEST_CASE("options out of range are refused") {
     const Scene scene = scene_of(tools::make_sphere(100), 1000);
     for (const int chunk : {-1, 0, 65537}) {
@@ -206,50 +255,78 @@ TEST_CASE("options out of range are refused") {
     }
 }
 
-TEST_CASE("a pool hands out all of its memory, once, and takes it back") {
+TEST_CASE("a pool hands out all of its memory, once, in order, and takes it back") {
     constexpr std::uint32_t kChunk = 4, kTreelets = 3;
-    TreeletQueuePool pool(10 * kChunk * sizeof(QueueSlot) + 1, kChunk, kTreelets);
+    TreeletQueuePool pool(10 * kChunk * sizeof(QueuedRay) + 1, kChunk, kTreelets);
     for (int round = 0; round < 3; ++round) {
-        CHECK(pool.fullest() == kNoSlot);
+        CHECK(pool.waiting_in_all() == 0);
         std::set<std::uint32_t> used;
         const auto put = [&](std::uint32_t treelet, std::uint32_t ray) {
             QueueTail& tail = pool.tails[treelet];
-            if (tail.next == tail.end && !pool.add_to_queue(pool, treelet)) return false;
+            if (tail.next == tail.end && !pool.add_chunk(pool, treelet)) return false;
             CHECK(used.insert(tail.next).second);
-            pool.slots[tail.next++].ray = {ray, kNoSlot, 1.0f, -1};
+            pool.slots[tail.next++] = {ray, 1.0f};
             return true;
         };
         for (std::uint32_t i = 0; i < 9; ++i) CHECK(put(1, i));
         for (std::uint32_t i = 0; i < 5; ++i) CHECK(put(2, 100 + i));
         CHECK(pool.waiting(1) == 9);
         CHECK(pool.waiting(2) == 5);
-        CHECK(pool.fullest() == 1);
         CHECK(pool.waiting_in_all() == 14);
-        CHECK(!pool.has_room());  // five of ten chunks
         std::uint32_t more = 0;
         while (put(0, more)) ++more;
-        CHECK(more == 20);
-        CHECK(!pool.add_pending(pool));
+        CHECK(more == 20);  // five of ten chunks
 
-        std::vector<QueuedRay> out(9);
-        std::size_t count = pool.take(1, out);
-        CHECK(count == 9);
-        std::set<std::uint32_t> rays;
-        for (const QueuedRay& ray : out) rays.insert(ray.ray);
-        CHECK(rays.size() == 9);
-        CHECK(*rays.rbegin() == 8);
-        CHECK(pool.waiting(1) == 0);
-        // As many chunks as there is room for.
-        CHECK(pool.take(0, std::span(out).first(7)) == 4);
-        CHECK(pool.waiting(0) == 16);
-        while (pool.take(0, out) != 0) {
+        for (const auto& [treelet, first, count] :
+             {std::array{0u, 0u, 20u}, std::array{1u, 0u, 9u}, std::array{2u, 100u, 5u}}) {
+            std::uint32_t next = first;
+            for (auto rays = pool.front(treelet); !rays.empty(); rays = pool.front(treelet)) {
+                for (const QueuedRay& ray : rays) CHECK(ray.ray == next++);
+                pool.pop(treelet);
+            }
+            CHECK(next == first + count);
+            CHECK(pool.waiting(treelet) == 0);
         }
-        while (pool.take(2, out) != 0) {
-        }
-        CHECK(pool.has_room());
     }
-    CHECK(pool.add_pending(pool));
-    CHECK(pool.free_pending_count == kChunk);
+}
+
+TEST_CASE("treelets come after the one above them, of siblings the nearest first") {
+    const Tree tree = tree_of(tools::make_city(20000, 1).view(), TreeletCut::kAreas, 10000);
+    const TreeView view = tree.view();
+    for (const glm::vec3 way : {glm::vec3(1, 0, 0), glm::vec3(-2, 5, 1), glm::vec3(0)}) {
+        const std::vector<std::uint32_t> order = treelet_order(view, way);
+        REQUIRE(order.size() == view.treelet_count);
+        std::vector<std::size_t> place(order.size(), order.size());
+        for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = i;
+        CHECK(order[0] == 0);
+        const auto distance = [&](std::uint32_t t) {
+            const float* centre = view.treelet_roots[t].centre;
+            return glm::dot(way, glm::vec3(centre[0], centre[1], centre[2]));
+        };
+        std::size_t siblings = 0;
+        for (std::uint32_t t = 1; t < view.treelet_count; ++t) {
+            const std::uint32_t parent = view.treelet_roots[t].parent;
+            REQUIRE(place[t] < order.size());
+            CHECK(place[parent] < place[t]);
+            for (std::uint32_t other = t + 1; other < view.treelet_count; ++other) {
+                if (view.treelet_roots[other].parent != parent) continue;
+                ++siblings;
+                if (distance(t) < distance(other)) CHECK(place[t] < place[other]);
+                if (distance(t) > distance(other)) CHECK(place[t] > place[other]);
+            }
+        }
+        CHECK(siblings > 100);
+    }
+}
+
+TEST_CASE("sweeps are as long as fetching the tree is worth, and as many as threads have use for") {
+    CHECK(rays_per_sweep(1, 1, 1) == 1);
+    CHECK(rays_per_sweep(1'000'000, 1'000'000, 1) == 125'000);
+    CHECK(rays_per_sweep(1'000'000, 170'000'000, 1) == 250'000);
+    CHECK(rays_per_sweep(1'000'000, 170'000'000, 2) == 250'000);
+    CHECK(rays_per_sweep(1'000'000, 170'000'000, 8) == 125'000);
+    CHECK(rays_per_sweep(1'000'000, 10'000'000'000, 1) == 1'000'000);
+    CHECK(rays_per_sweep(1'000'000, 10'000'000'000, 3) == 333'334);
 }
 
 TEST_CASE("tracing tells of its progress and can be cancelled, in every mode") {

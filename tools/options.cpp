@@ -19,6 +19,13 @@ namespace {
 constexpr Named<TreeletCut> kTreeletCuts[] = {{TreeletCut::kAreas, "areas"},
                                               {TreeletCut::kSubtrees, "subtrees"}};
 
+/// Modes that never use treelets are not to wait for trees to be cut.
+std::optional<std::size_t> treelet_bytes_for(Mode mode) {
+    if (mode == Mode::kTreelet) return kUsualTreeletBytes;
+    if (mode == Mode::kAuto) return std::nullopt;
+    return 0;
+}
+
 /// All of the text as a number, in the same way whatever the locale.
 template <class T>
 std::optional<T> parse_number(std::string_view text) {
@@ -115,8 +122,7 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
                     [&](std::string_view name) {
                         options.trace.mode = parse_mode(name);
                         // --treelet-bytes is defined after this and so has the last word.
-                        const bool needs_treelets = options.trace.mode == Mode::kTreelet;
-                        options.build.treelet_bytes = needs_treelets ? kUsualTreeletBytes : 0;
+                        options.build.treelet_bytes = treelet_bytes_for(options.trace.mode);
                     })
         ->default_str("auto");
     add_name_option(app, "--isa", "Instruction set, without it the CPU's best", isa_names(),
@@ -138,7 +144,8 @@ void add_treelet_options(CLI::App& app, CommonOptions& options) {
         ->default_str(std::string(kTreeletCuts[0].name));
     app.add_option("--treelet-bytes", options.build.treelet_bytes,
                    "Bytes of a treelet, at most; 0 for none")
-        ->default_str(fmt::format("{} with --mode treelet", kUsualTreeletBytes));
+        ->default_str(fmt::format("{} with --mode treelet, or auto if the tree is large",
+                                  kUsualTreeletBytes));
     app.add_option("--queue-bytes", options.trace.queue_bytes, "Bytes for rays that wait")
         ->capture_default_str();
     app.add_option("--queue-chunk", options.trace.queue_chunk, "Rays by which queues grow")

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -45,7 +46,10 @@ enum class TreeletCut : std::uint8_t {
 };
 
 /// A size of treelets that serves `Mode::kTreelet` well: docs/benchmarking.md#treelets.
-inline constexpr std::size_t kUsualTreeletBytes = std::size_t{4} << 20;
+inline constexpr std::size_t kUsualTreeletBytes = std::size_t{1} << 20;
+/// Trees of so many bytes are cut into treelets if nothing else is asked for: more than the last
+/// level of most caches holds.
+inline constexpr std::size_t kLeastBytesToCut = std::size_t{32} << 20;
 
 struct BuildOptions {
     AccelKind accel = AccelKind::kBvh;
@@ -83,11 +87,12 @@ struct BuildOptions {
     int morton_bits = 0;
     /// Keep trees in their binary form, too, for CUDA devices, which walk that. 32 bytes a node.
     bool keep_binary_nodes = false;
-    /// Bytes of a treelet, at most, with its triangles (but one node is not cut), as
-    /// kUsualTreeletBytes; 0 cuts none, and then `Mode::kTreelet` is as `Mode::kStream`. Larger
-    /// ones have more rays to share what is fetched, smaller ones stay in a nearer cache. Cutting
-    /// takes a sixth of the time of the fastest builds.
-    std::size_t treelet_bytes = 0;
+    /// Bytes of a treelet, at most, with its triangles (but one node is not cut). Rays enter fewer
+    /// large ones, small ones stay in a nearer cache. 0 cuts none: then `Mode::kAuto` does without
+    /// them, and `Mode::kTreelet` is as `Mode::kStream`. Without a value it is kUsualTreeletBytes
+    /// for trees from kLeastBytesToCut on, where cutting takes a tenth of the time of building, and
+    /// 0 for smaller ones, and for `kBvhMorton`, of whose time it would take a third.
+    std::optional<std::size_t> treelet_bytes;
     TreeletCut treelet_cut = TreeletCut::kAreas;
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is
     /// the same for any number.

@@ -24,9 +24,9 @@ enum class Mode : std::uint8_t {
     kTile,      ///< up to 128 rays share one stack and a beam around them, as far as they cohere
     kStream,    ///< incoherent rays by the thousand: sorted, then up to 64 share one stack. From
                 ///< 131,072 rays on that start anywhere, sorting takes 4 bytes a ray and 64 MB
-    kTreelet    ///< incoherent rays by the million in scenes far larger than the cache: each waits
-                ///< at the part of the tree it enters next until there are many. Where the scene is
-                ///< not one tree, or not cut into treelets, as kStream
+    kTreelet    ///< incoherent rays by the million in scenes far larger than the cache: those that
+                ///< meet a part of the tree go through it together. Where the scene is not one
+                ///< tree, or not cut into treelets, as kStream
 };
 
 struct ModeName {
@@ -40,7 +40,7 @@ struct ModeName {
 
 /// What `Mode::kTreelet` does besides: how rays and treelets come together.
 struct TreeletTraceStats {
-    std::uint64_t loads = 0;          ///< times that a treelet was gone through by its queued rays
+    std::uint64_t loads = 0;          ///< times that a treelet was gone through by waiting rays
     std::uint64_t entries = 0;        ///< rays that entered treelets, each as often as it did
     std::uint64_t streams = 0;        ///< of up to 64 rays, that did so
     std::uint64_t treelet_bytes = 0;  ///< of all loads, if each reads all of its treelet
@@ -76,10 +76,10 @@ struct TraceOptions {
     int width = 0;
     /// Kernels to use; without a value default_isa().
     std::optional<IsaId> isa;
-    /// For `kTreelet`: bytes for rays that wait, and what each enters later, divided among threads;
-    /// 16 a ray and 16 a treelet that it enters later. Where they do not suffice, rays go on
-    /// without waiting. Some 50 bytes a treelet, and 1 MB, come on top for each thread.
-    /// Rays are sorted 4 million at a time, which takes 20 bytes a ray.
+    /// For `kTreelet`: bytes for rays that wait, divided among threads: 8 a ray and a treelet that
+    /// it waits at. Where they do not suffice, rays go on without waiting. Some 50 bytes a treelet,
+    /// and 1 MB, come on top for each thread. Rays are traced 4 million at a time, which takes 60
+    /// bytes a ray.
     std::size_t queue_bytes = std::size_t{256} << 20;
     /// For `kTreelet`: queues grow by so many rays at a time, 1 to 65536. Fewer waste less memory.
     int queue_chunk = 256;

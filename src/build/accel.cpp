@@ -141,7 +141,7 @@ Tree build_tree(MeshView mesh, const BuildOptions& options, Progress& progress, 
         return make_tree(hierarchy, mesh, options, parallel);
     };
     Tree tree = build(kind, mesh, std::move(references.items), options, parallel, finish);
-    cut_into_treelets(tree, options, parallel);
+    cut_into_treelets(tree, kind, options, parallel);
     tree.stats.skipped = skipped;
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     tree.stats.seconds = elapsed.count();

@@ -86,6 +86,7 @@ TreeView Tree::view() const noexcept {
     if (!treelets.begin.empty()) {
         out.treelet_begin = treelets.begin.data();
         out.treelet_of_node = treelets.of_node.data();
+        out.treelet_roots = treelets.roots.data();
         out.most_treelet_exits = treelets.most_exits;
         out.treelet_count = static_cast<std::uint32_t>(treelets.begin.size() - 1);
     }
@@ -102,7 +103,8 @@ TreeView Tree::view() const noexcept {
 std::size_t Tree::byte_count() const noexcept {
     return nodes.size() * sizeof(Node) + wide_nodes.size() * sizeof(WideNode) +
            blocks.size() * sizeof(TriangleBlock) + grid.byte_count() +
-           (treelets.begin.size() + treelets.of_node.size()) * sizeof(std::uint32_t);
+           (treelets.begin.size() + treelets.of_node.size()) * sizeof(std::uint32_t) +
+           treelets.roots.size() * sizeof(TreeletRoot);
 }
 
 Tree make_tree(const Hierarchy& hierarchy, MeshView mesh, const BuildOptions& options,

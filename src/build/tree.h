@@ -16,7 +16,8 @@ namespace packet {
 struct Treelets {
     std::vector<std::uint32_t> begin;    ///< treelet t is nodes begin[t] to begin[t + 1]
     std::vector<std::uint32_t> of_node;  ///< treelets by node
-    std::uint32_t most_exits = 0;        ///< links that leave a treelet
+    std::vector<TreeletRoot> roots;
+    std::uint32_t most_exits = 0;  ///< links that leave a treelet
 };
 
 /// Owns what a TreeView shows: a tree, or a grid.

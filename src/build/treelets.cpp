@@ -244,6 +244,26 @@ std::vector<bool> treelet_roots_by_subtree(std::span<const WideNode> nodes,
     return is_root;
 }
 
+/// What is noted of the treelets, once the nodes are in their places.
+[[nodiscard]] static std::vector<TreeletRoot> roots_of(std::span<const WideNode> nodes,
+                                                       const Treelets& treelets) {
+    std::vector<TreeletRoot> out(treelets.begin.size() - 1, TreeletRoot{});
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        const std::uint32_t treelet = treelets.of_node[i];
+        out[treelet].bytes += bytes_with_blocks(nodes[i]);
+        for (int c = 0; c < kWideSize; ++c) {
+            if (!is_inner(nodes[i], c)) continue;
+            const std::uint32_t below = treelets.of_node[nodes[i].child[c].link];
+            if (below == treelet) continue;
+            out[below].parent = treelet;
+            for (int a = 0; a < 3; ++a) {
+                out[below].centre[a] = nodes[i].plane[0][a][c] + nodes[i].plane[1][a][c];
+            }
+        }
+    }
+    return out;
+}
+
 TreeletStats count_treelets(const Tree& tree) {
     TreeletStats out;
     if (tree.treelets.begin.empty()) return out;
@@ -252,35 +272,37 @@ TreeletStats count_treelets(const Tree& tree) {
     const double root_area =
         std::max(static_cast<double>(tree.bounds.half_area()), std::numeric_limits<double>::min());
     out.expected_entries = 1.0;
-    std::vector<std::size_t> bytes(out.count);
     for (std::size_t i = 0; i < tree.wide_nodes.size(); ++i) {
         const WideNode& node = tree.wide_nodes[i];
         const std::uint32_t treelet = tree.treelets.of_node[i];
-        bytes[treelet] += bytes_with_blocks(node);
         for (int c = 0; c < kWideSize; ++c) {
             if (is_inner(node, c) && tree.treelets.of_node[node.child[c].link] != treelet) {
                 out.expected_entries += area_of(node, c) / root_area;
             }
         }
     }
-    for (const std::size_t size : bytes) {
-        out.bytes += size;
-        out.most_bytes = std::max(out.most_bytes, size);
+    for (const TreeletRoot& root : tree.treelets.roots) {
+        out.bytes += root.bytes;
+        out.most_bytes = std::max<std::size_t>(out.most_bytes, root.bytes);
     }
     return out;
 }
 
-void cut_into_treelets(Tree& tree, const BuildOptions& options, const Parallel& parallel) {
-    if (options.treelet_bytes == 0 || !tree.view().is_tree()) return;
+void cut_into_treelets(Tree& tree, AccelKind kind, const BuildOptions& options,
+                       const Parallel& parallel) {
+    const bool is_usual = kind != AccelKind::kBvhMorton && tree.byte_count() >= kLeastBytesToCut;
+    const std::size_t usual = is_usual ? kUsualTreeletBytes : 0;
+    const std::size_t most_bytes = options.treelet_bytes.value_or(usual);
+    if (most_bytes == 0 || !tree.view().is_tree()) return;
     const std::span<const WideNode> nodes = tree.wide_nodes;
-    const std::vector<bool> is_root =
-        options.treelet_cut == TreeletCut::kAreas
-            ? treelet_roots_by_area(nodes, options.treelet_bytes, parallel)
-            : treelet_roots_by_subtree(nodes, options.treelet_bytes);
+    const std::vector<bool> is_root = options.treelet_cut == TreeletCut::kAreas
+                                          ? treelet_roots_by_area(nodes, most_bytes, parallel)
+                                          : treelet_roots_by_subtree(nodes, most_bytes);
     Layout layout(nodes, is_root);
     ScratchVector<WideNode> moved = layout.moved(parallel);
     tree.treelets = std::move(layout).treelets();
     tree.wide_nodes = std::move(moved);
+    tree.treelets.roots = roots_of(tree.wide_nodes, tree.treelets);
     tree.stats.treelets = count_treelets(tree);
     tree.stats.bytes = tree.byte_count();
 }

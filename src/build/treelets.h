@@ -18,7 +18,8 @@ namespace packet {
 /// depth first; a treelet comes before those below it. Fills tree.treelets and the statistics.
 /// Nothing for a grid, or if `options` want none. The same for any number of threads. For areas
 /// O(nodes * nodes of a treelet) at worst, mostly some steps a node; for subtrees O(nodes).
-void cut_into_treelets(Tree& tree, const BuildOptions& options, const Parallel& parallel);
+void cut_into_treelets(Tree& tree, AccelKind kind, const BuildOptions& options,
+                       const Parallel& parallel);
 
 /// By which nodes become roots of treelets; a table of them by node.
 [[nodiscard]] std::vector<bool> treelet_roots_by_area(std::span<const WideNode> nodes,

@@ -276,7 +276,7 @@ private:
         const std::vector<std::uint32_t>&begin = tree_.treelets.begin, &of = tree_.treelets.of_node;
         const std::size_t count = begin.size() - 1;
         require(begin.front() == 0 && begin.back() == tree_.wide_nodes.size() &&
-                    of.size() == tree_.wide_nodes.size(),
+                    of.size() == tree_.wide_nodes.size() && tree_.treelets.roots.size() == count,
                 "treelet", 0, "they are not all nodes");
         std::size_t cut_edges = 0;
         std::uint32_t most_exits = 0;
@@ -285,16 +285,21 @@ private:
         }
         for (std::uint32_t t = 0; t < count; ++t) {
             std::uint32_t exits = 0;
+            std::uint64_t bytes = 0;
             for (std::uint32_t i = begin[t]; i < begin[t + 1]; ++i) {
                 require(of[i] == t, "treelet", t, "a node of it is noted as another's");
+                bytes += bytes_with_blocks(tree_.wide_nodes[i]);
                 for (const WideChild& child : tree_.wide_nodes[i].child) {
                     if (child.is_leaf() || child.link - begin[t] < begin[t + 1] - begin[t])
                         continue;
                     require(begin[of[child.link]] == child.link, "treelet", t,
                             "a link leads into the middle of another");
+                    require(of[child.link] > t && tree_.treelets.roots[of[child.link]].parent == t,
+                            "treelet", of[child.link], "another than noted is above it");
                     ++exits;
                 }
             }
+            require(tree_.treelets.roots[t].bytes == bytes, "treelet", t, "bytes are others");
             cut_edges += exits;
             most_exits = std::max(most_exits, exits);
         }

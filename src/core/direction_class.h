@@ -1,5 +1,6 @@
 // Rays whose directions share octant and longest axis are of one class: they meet the planes of
-// boxes in the same order and move triangles along the same axes, so they can walk together.
+// boxes in the same order and move triangles along the same axes, so they can walk together. The
+// classes of an octant follow each other.
 #pragma once
 
 #include "core/macros.h"
@@ -19,7 +20,7 @@ PACKET_INLINE int direction_class(float x, float y, float z) {
     const int x_is_longest =
         static_cast<int>(size_x >= size_y) & static_cast<int>(size_x >= size_z);
     const int y_is_longest = (1 - x_is_longest) & static_cast<int>(size_y >= size_z);
-    return octant + 8 * (2 - 2 * x_is_longest - y_is_longest);
+    return 3 * octant + 2 - 2 * x_is_longest - y_is_longest;
 }
 
 }  // namespace packet

@@ -103,6 +103,15 @@ struct GridView {
     const GridTree* trees = nullptr;
 };
 
+/// What decides when rays go through a treelet (src/schedule/treelet_order.h), and whether it is
+/// fetched as a whole.
+struct TreeletRoot {
+    float centre[3];       ///< of its box, twice
+    std::uint32_t parent;  ///< the treelet above it; of the first one itself
+    std::uint64_t bytes;   ///< of nodes and blocks
+};
+static_assert(sizeof(TreeletRoot) == 24 && std::is_trivially_copyable_v<TreeletRoot>);
+
 /// A tree, or a grid. Items of leaves are triangles (item i is lane i % 8 of block i / 8) or
 /// instances.
 struct TreeView {
@@ -112,11 +121,12 @@ struct TreeView {
     std::uint32_t node_count = 0;  ///< of wide ones if there are no others
     std::uint64_t byte_count = 0;  ///< of wide nodes and blocks
     /// Treelet t is wide nodes treelet_begin[t] to treelet_begin[t + 1], the first one its root;
-    /// links that leave it lead to roots. No treelets: the tree is not cut.
+    /// links that leave it lead to roots of later ones. No treelets: the tree is not cut.
     std::uint32_t treelet_count = 0;
     std::uint32_t most_treelet_exits = 0;  ///< links that leave one
     const std::uint32_t* treelet_begin = nullptr;
     const std::uint32_t* treelet_of_node = nullptr;
+    const TreeletRoot* treelet_roots = nullptr;
     GridView grid;               ///< if there is one, rays start in it; its cells may hold trees
     float lower[3] = {0, 0, 0};  ///< the box of all items
     float upper[3] = {0, 0, 0};

@@ -24,31 +24,12 @@ struct TraceBatch {
     TraceStats* stats;       ///< counted into by the counting kernels, else null
 };
 
-/// A ray that waits for a treelet: what of it changes on the way. The rest is in the caller's
-/// array.
+/// A ray that waits at a treelet, unless it has hit something before `enter` by then.
 struct QueuedRay {
-    std::uint32_t ray;      ///< its index in TraceBatch::rays
-    std::uint32_t pending;  ///< the slot of the treelet that it enters after this one, or kNoSlot
-    float best_t;           ///< farther than this nothing counts
-    std::int32_t prim_id;   ///< what it hits there, or -1
-};
-
-/// A treelet that a ray enters later, unless it has hit something before `enter` by then.
-struct PendingTreelet {
-    std::uint32_t treelet;
+    std::uint32_t ray;  ///< its index in TraceBatch::rays
     float enter;
-    std::uint32_t next;  ///< the slot of the one after it, or kNoSlot; of free slots, too
-    std::uint32_t unused;
 };
-
-inline constexpr std::uint32_t kNoSlot = 0xFFFFFFFF;
-
-/// What memory for rays consists of.
-union QueueSlot {
-    QueuedRay ray;
-    PendingTreelet pending;
-};
-static_assert(sizeof(QueueSlot) == 16);
+static_assert(sizeof(QueuedRay) == 8);
 
 /// Where a treelet's queue takes the next rays.
 struct QueueTail {
@@ -57,12 +38,9 @@ struct QueueTail {
 
 /// Queues as kernels see them: they fill slots, and ask for more where there are none.
 struct TreeletQueues {
-    QueueSlot* slots = nullptr;
+    QueuedRay* slots = nullptr;
     QueueTail* tails = nullptr;  ///< by treelet
-    std::uint32_t free_pending = kNoSlot;
-    std::uint32_t free_pending_count = 0;
-    bool (*add_to_queue)(TreeletQueues&, std::uint32_t treelet) noexcept = nullptr;
-    bool (*add_pending)(TreeletQueues&) noexcept = nullptr;
+    bool (*add_chunk)(TreeletQueues&, std::uint32_t treelet) noexcept = nullptr;
 };
 
 /// A link that leads out of a treelet, and the rays of a stream that follow it, none of them before
@@ -78,8 +56,7 @@ struct TreeletExit {
 struct TreeletBatch {
     TraceBatch rays;
     std::uint32_t treelet;
-    const float* best_t;           ///< null: all rays begin here
-    const std::uint32_t* pending;  ///< as in QueuedRay
+    const float* best_t;  ///< null: all rays begin here
     const std::int32_t* prim_id;
     TreeletQueues* queues;
     TreeletExit* exits;  ///< room for as many as lead out of the treelet

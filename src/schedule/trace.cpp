@@ -4,7 +4,7 @@
 #include "schedule/parallel.h"
 #include "schedule/ray_tasks.h"
 #include "schedule/trace_plan.h"
-#include "schedule/treelet_scheduler.h"
+#include "schedule/treelet_sweep.h"
 
 #include <packet/error.h>
 #include <packet/trace.h>
@@ -35,7 +35,7 @@ public:
           options_(options),
           rays_(rays),
           parallel_(options.threads, progress),
-          plan_(make_plan(scene_, rays, query, options.mode)),
+          plan_(make_plan(scene_, rays, query, options.mode, parallel_.threads())),
           tasks_(plan_.sorting != Sorting::kNone ? RayTasks::sorted(rays, parallel_.threads())
                                                  : RayTasks(rays, options.width)),
           tries_(plan_.is_trial && tasks_.count() >= kLeastTasksForTrial) {
@@ -53,7 +53,7 @@ public:
 
     [[nodiscard]] bool goes_by_treelets() const { return plan_.by_treelets; }
 
-    /// As many rays at a time as are sorted together: the more, the more wait at a treelet.
+    /// As many rays at a time as are sorted together: the more, the more meet at a treelet.
     void run_by_treelets(KernelTable::Treelet kernel, Hit* hits, std::uint8_t* occluded) const {
         for (std::size_t first = 0; first < rays_.size(); first += kMostSortedTogether) {
             const std::size_t count = std::min(kMostSortedTogether, rays_.size() - first);
@@ -64,7 +64,7 @@ public:
                                    hits == nullptr ? nullptr : hits + first,
                                    occluded == nullptr ? nullptr : occluded + first,
                                    options_.stats};
-            parallel_.run([&] { run_queues(batch, kernel); });
+            parallel_.run([&] { run_sweeps(batch, kernel); });
         }
     }
 
@@ -84,46 +84,25 @@ public:
     }
 
 private:
-    /// Each thread has its own queues and takes rays as long as there are any.
-    void run_queues(const TraceBatch& batch, KernelTable::Treelet kernel) const {
+    /// Threads take sweeps as long as there are any.
+    void run_sweeps(const TraceBatch& batch, KernelTable::Treelet kernel) const {
         ScratchVector<std::uint32_t> order(batch.count);
         sort_many({batch.rays, batch.count}, order, 0, parallel_);
-        clear(batch);  // kernels write where something is hit
         const auto threads = static_cast<std::size_t>(parallel_.threads());
-        const TreeletJob job{batch,
-                             kernel,
-                             options_.queue_bytes / threads,
-                             static_cast<std::uint32_t>(options_.queue_chunk),
-                             order.data(),
-                             rays_per_stream_task(batch.count, parallel_.threads())};
+        const TreeletJob job{batch, kernel, options_.queue_bytes / threads,
+                             static_cast<std::uint32_t>(options_.queue_chunk)};
+        const std::size_t length = rays_per_sweep(
+            batch.count, treelet_bytes(*scene_.view.instances[0].tree), parallel_.threads());
         std::atomic<std::size_t> next{0};
-        parallel_.for_pieces(threads, 1, [&](std::size_t, std::size_t) { run_thread(job, next); });
-    }
-    void clear(const TraceBatch& batch) const {
-        constexpr std::size_t kGrain = 65536;  // a megabyte or so of hits
-        parallel_.for_pieces(batch.count, kGrain, [&](std::size_t begin, std::size_t end) {
-            const std::size_t count = end - begin;
-            if (batch.hits != nullptr) std::fill_n(batch.hits + begin, count, Hit{});
-            if (batch.occluded != nullptr) {
-                std::fill_n(batch.occluded + begin, count, std::uint8_t{0});
+        parallel_.for_pieces(threads, 1, [&](std::size_t, std::size_t) {
+            TreeletSweep sweep(job);
+            for (std::size_t begin; (begin = next.fetch_add(length)) < batch.count;) {
+                const std::size_t count = std::min(length, batch.count - begin);
+                sweep.run(std::span(order).subspan(begin, count), parallel_,
+                          static_cast<double>(count) / static_cast<double>(rays_.size()));
             }
+            add_stats(sweep.stats());
         });
-    }
-    void run_thread(const TreeletJob& job, std::atomic<std::size_t>& next) const {
-        const std::size_t all = job.batch.count;
-        const double part_of_one = 1.0 / static_cast<double>(rays_.size());
-        TreeletScheduler scheduler(job);
-        for (;;) {
-            parallel_.check();
-            if (!scheduler.has_room() && scheduler.run()) continue;
-            const std::size_t begin = next.fetch_add(job.rays_per_start);
-            if (begin >= all) break;
-            const std::size_t count = std::min(job.rays_per_start, all - begin);
-            scheduler.start(begin, count);
-            parallel_.advance(part_of_one * static_cast<double>(count));
-        }
-        while (scheduler.run()) parallel_.check();
-        add_stats(scheduler.stats());
     }
     void add_stats(const TraceStats& stats) const {
         if (options_.stats == nullptr) return;

@@ -3,10 +3,14 @@
 #include "schedule/auto_mode.h"
 #include "schedule/ray_tasks.h"
 #include "schedule/stream_order.h"
+#include "schedule/treelet_sweep.h"
 
 namespace packet {
 
 namespace {
+
+// Fewer fill not much more than one task does.
+constexpr std::size_t kLeastRaysTogether = 4 * StreamOrder::kMostRays;
 
 KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
@@ -30,19 +34,17 @@ bool has_treelets(const SceneView& scene) {
     return has_one_tree(scene) && scene.instances[0].tree->treelet_count != 0;
 }
 
+TracePlan plan_treelets() { return {.kernel = KernelTable::kStream, .by_treelets = true}; }
+
 TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
-    // Fewer fill not much more than one task does.
-    constexpr std::size_t kLeastTogether = 4 * StreamOrder::kMostRays;
     constexpr std::size_t kMostTogether = 0xFFFFFFFF;
-    const bool together = rays.size() >= kLeastTogether && rays.size() <= kMostTogether &&
+    const bool together = rays.size() >= kLeastRaysTogether && rays.size() <= kMostTogether &&
                           are_scattered(rays, scene.top.bounds);
     return {KernelTable::kStream, together ? Sorting::kTogether : Sorting::kByTask};
 }
 
 TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode) {
-    if (mode == Mode::kTreelet && has_treelets(scene.view)) {
-        return {.kernel = KernelTable::kStream, .by_treelets = true};
-    }
+    if (mode == Mode::kTreelet && has_treelets(scene.view)) return plan_treelets();
     if (mode == Mode::kTreelet || mode == Mode::kStream) {
         if (!has_one_tree(scene.view)) return {KernelTable::kSingle};
         return plan_streams(scene, rays);
@@ -51,23 +53,27 @@ TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode
 }
 
 /// As the rays and the query suggest: docs/benchmarking.md#beside-embree.
-TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query) {
+TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
+                        int threads) {
     const bool may_stream = rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
     const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
-    if (may_stream && query == TraceQuery::kAny) {
-        if (is_coherent) return {KernelTable::kSorted, Sorting::kByTask};
-        return plan_streams(scene, rays);
+    if (is_coherent) {
+        if (!may_stream || query == TraceQuery::kClosest) return {KernelTable::kTile};
+        return {KernelTable::kSorted, Sorting::kByTask};
     }
-    if (is_coherent) return {KernelTable::kTile};
+    if (has_treelets(scene.view) && rays.size() >= kLeastRaysTogether &&
+        sweeps_beat_streams(rays.size(), treelet_bytes(*scene.view.instances[0].tree), threads)) {
+        return plan_treelets();
+    }
     if (may_stream) return plan_streams(scene, rays);
     return {.kernel = KernelTable::kSingle, .is_trial = true};
 }
 
 }  // namespace
 
-TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
-                    Mode mode) {
-    return mode == Mode::kAuto ? plan_by_looks(scene, rays, query)
+TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query, Mode mode,
+                    int threads) {
+    return mode == Mode::kAuto ? plan_by_looks(scene, rays, query, threads)
                                : plan_as_asked(scene, rays, mode);
 }
 

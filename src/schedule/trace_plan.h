@@ -26,8 +26,9 @@ struct TracePlan {
     bool by_treelets = false;  ///< by kernels of their own
 };
 
-/// `Mode::kAuto` looks at a sample of the rays: docs/benchmarking.md#beside-embree. O(1).
+/// `Mode::kAuto` looks at a sample of the rays: docs/benchmarking.md#beside-embree. O(1), and
+/// O(treelets).
 [[nodiscard]] TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays,
-                                  TraceQuery query, Mode mode);
+                                  TraceQuery query, Mode mode, int threads);
 
 }  // namespace packet
