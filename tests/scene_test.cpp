@@ -274,7 +274,7 @@ TEST_CASE("shadow rays go by tiles where these are full, by streams elsewhere, w
         return std::pair(occluded, stats.lane_utilization());
     };
     for (const bool is_fine : {false, true}) {
-        Scene scene = make_scene(tools::make_terrain(is_fine ? 200000 : 2000, 3));
+        Scene scene = make_scene(tools::make_terrain(is_fine ? 200000 : 200, 3));
         scene.commit();
         const auto rays = rays_over(scene.bounds());
         for (const IsaId isa : built_isas()) {

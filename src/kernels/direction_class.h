@@ -11,30 +11,42 @@ namespace packet {
 /// sort them.
 inline constexpr int kMostClasses = 4;
 
-/// Whether rays are of one class, as their directions' columns say. Lanes from `count` on are
-/// ignored.
+/// -0 counts as negative, as its reciprocal does.
 template <int N, class Isa>
-PACKET_INLINE bool share_class(const float* const* dir, int count) {
+PACKET_INLINE Mask<N, Isa> are_negative(const Float<N, Isa>& a) {
+    const Float<N, Isa> zero(0.0f);
+    const Mask<N, Isa> are_zero = a == zero;
+    if (none(are_zero)) return a < zero;
+    return (a < zero) | (are_zero & (Float<N, Isa>(1.0f) / a < zero));
+}
+
+/// How many rays from the first on are of its class, at most `count` (>= 1), as their directions'
+/// columns say, which are to end no sooner than a whole number of N.
+template <int N, class Isa>
+PACKET_INLINE int class_run(const float* const* dir, int count) {
     using F = Float<N, Isa>;
-    using M = Mask<N, Isa>;
-    constexpr std::uint32_t kAll = static_cast<std::uint32_t>((std::uint64_t{1} << N) - 1);
     constexpr int kTraits = 5;  // that make a class: three signs, and which axis is longest
-    std::uint32_t some_have = 0, some_lack = 0;
+    std::uint32_t first_has[kTraits] = {};
     for (int first = 0; first < count; first += N) {
-        const std::uint32_t used = count - first < N ? (1u << (count - first)) - 1 : kAll;
         const F x = F::load(dir[0] + first), y = F::load(dir[1] + first),
                 z = F::load(dir[2] + first);
-        const F size_x = abs(x), size_y = abs(y), size_z = abs(z), zero(0.0f);
-        const M x_is_longest = (size_y <= size_x) & (size_z <= size_x);
-        const M traits[kTraits] = {x < zero, y < zero, z < zero, x_is_longest,
-                                   x_is_longest | (size_z <= size_y)};
+        const F size_x = abs(x), size_y = abs(y), size_z = abs(z);
+        const auto x_is_longest = (size_y <= size_x) & (size_z <= size_x);
+        const std::uint32_t traits[kTraits] = {are_negative(x).bits(), are_negative(y).bits(),
+                                               are_negative(z).bits(), x_is_longest.bits(),
+                                               (x_is_longest | (size_z <= size_y)).bits()};
+        std::uint32_t others = 0;
         for (int i = 0; i < kTraits; ++i) {
-            const std::uint32_t bits = traits[i].bits() & used;
-            some_have |= (bits != 0 ? 1u : 0u) << i;
-            some_lack |= (bits != used ? 1u : 0u) << i;
+            if (first == 0) first_has[i] = 0 - (traits[i] & 1u);
+            others |= traits[i] ^ first_has[i];
+        }
+        others &= static_cast<std::uint32_t>((std::uint64_t{1} << N) - 1);
+        if (others != 0) {
+            const int run = first + __builtin_ctz(others);
+            return run < count ? run : count;
         }
     }
-    return (some_have & some_lack) == 0;
+    return count;
 }
 
 /// Rays sorted by class: those of class c are ray[begin[c]] to ray[begin[c + 1]], in order.

@@ -2,32 +2,37 @@
 // a stream. src/schedule/stream_order.h sorts them so. Any order is right, but slow.
 #pragma once
 
-#include "core/direction_class.h"
 #include "kernels/stream_walk.h"
 #include "kernels/trace_batch.h"
 
 namespace packet {
 
-/// How many rays from the first on are of its class.
-PACKET_INLINE int class_run(const float* const* dir, int most) {
-    const auto class_of = [&](int i) { return direction_class(dir[0][i], dir[1][i], dir[2][i]); };
-    const int first_class = class_of(0);
-    int count = 1;
-    while (count < most && class_of(count) == first_class) ++count;
-    return count;
-}
-
 /// Fills a stream with the first `count` rays, which are of one class.
 template <class Isa>
 PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, const RayColumns& rays,
-                               int count, std::int32_t instance_id) {
+                               int count) {
     out.rays.active = 0;
     for (int first = 0; first < count; first += kSingleLanes) {
         const LoadedRays<kSingleLanes, Isa> loaded(rays.from(first),
                                                    lanes_below<kSingleLanes>(count, first));
-        out.rays.load(tree, loaded.ray, loaded.active.bits(), first, instance_id);
+        out.rays.load(tree, loaded.ray, loaded.active.bits(), first);
     }
     out.looking = out.rays.active;
+}
+
+/// The hits of eight rays.
+template <int kCount, class Isa>
+PACKET_INLINE void store_hits(const StreamHits& hits, int first, std::int32_t instance_id,
+                              HitArrays<kCount, Isa>& out) {
+    using F = Float<kSingleLanes, Isa>;
+    using I = Int<kSingleLanes, Isa>;
+    BestHits<kSingleLanes, Isa> best;
+    best.t = F::load(hits.t + first);
+    best.u = F::load(hits.u + first);
+    best.v = F::load(hits.v + first);
+    best.prim_id = I::load(hits.prim_id + first);
+    best.instance_id = instance_id;
+    store_hits(best, out, first);
 }
 
 /// Streams that take steps in turn: what one of them fetches arrives while the others walk.
@@ -44,7 +49,7 @@ public:
           tree_(*instance.tree),
           instance_id_(static_cast<std::int32_t>(instance.instance_id)),
           stats_(batch.stats),
-          walk_(tree_, instance_id_, stats_) {}
+          walk_(tree_, stats_) {}
 
     /// The rays from `begin` on.
     PACKET_INLINE void trace(std::size_t begin) {
@@ -94,16 +99,26 @@ private:
         const std::size_t left = batch_.count - next_;
         const int most = left < kStreamRays ? static_cast<int>(left) : kStreamRays;
         const RayColumns columns = gather_rays(batch_, next_, most, gathered_);
-        turn.count = class_run(columns.component + 4, most);
+        turn.count = class_run<kSingleLanes, Isa>(columns.component + 4, most);
         next_ += static_cast<std::size_t>(turn.count);
         prefetch_rays(batch_, next_, kStreamRays);
-        load_stream(turn.stream, tree_, columns, turn.count, instance_id_);
+        load_stream(turn.stream, tree_, columns, turn.count);
         walk_.start(turn.stream, 0, turn.stream.looking);
         return true;
     }
     PACKET_INLINE void finish(const Turn& turn) {
-        for (int i = 0; i < turn.count; ++i) store_hits(turn.stream.rays.best[i], hits_, i);
-        scatter_hits<query>(batch_, turn.begin, turn.count, hits_);
+        if constexpr (query == Query::kAny) {
+            const RaySet occluded = turn.stream.rays.active & ~turn.stream.looking;
+            for (int i = 0; i < turn.count; ++i) {
+                const std::size_t at = place(batch_, turn.begin + static_cast<std::size_t>(i));
+                batch_.occluded[at] = static_cast<std::uint8_t>(occluded >> i & 1u);
+            }
+        } else {
+            for (int i = 0; i < turn.count; i += kSingleLanes) {
+                store_hits(turn.stream.rays.hits, i, instance_id_, hits_);
+            }
+            scatter_hits<query>(batch_, turn.begin, turn.count, hits_);
+        }
     }
 
     const TraceBatch& batch_;

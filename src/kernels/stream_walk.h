@@ -39,18 +39,25 @@ struct alignas(64) StreamRay {
 };
 static_assert(sizeof(StreamRay) == 2 * sizeof(Floats8));
 
-/// The rays of a stream, and what they have found.
+/// What the rays of a stream have found. A prim_id of kNoId: nothing.
+struct StreamHits {
+    alignas(32) float t[kStreamRays];
+    float u[kStreamRays], v[kStreamRays];
+    std::int32_t prim_id[kStreamRays];
+};
+
+/// The rays of a stream, and for closest-hit what they have found.
 template <class Isa>
 struct StreamRays {
     StreamRay ray[kStreamRays];
-    BestHits<1, Isa> best[kStreamRays];
+    StreamHits hits;
     PreparedLanes lanes[kStreamRays / kSingleLanes];
     int near_side[3] = {0, 0, 0}, axis[3] = {0, 1, 2};  ///< of all
     RaySet active = 0;
 
     /// Rays `first` to `first + 8`, of which `used` are usable and of the stream's class.
     PACKET_INLINE void load(const TreeView& tree, const RayLanes<kSingleLanes, Isa>& rays,
-                            std::uint32_t used, int first, std::int32_t instance_id) {
+                            std::uint32_t used, int first) {
         PreparedLanes& from = lanes[first / kSingleLanes];
         prepare_lanes(tree, rays, from);
         if (used != 0) {
@@ -63,13 +70,11 @@ struct StreamRays {
         active |= RaySet{used} << first;
         const BestHits<kSingleLanes, Isa> none_yet(rays.tfar,
                                                    Mask<kSingleLanes, Isa>::from_bits(used));
-        float best_t[kSingleLanes];
-        none_yet.t.store(best_t);
-        for (int i = 0; i < kSingleLanes; ++i) {
-            best[first + i].reset(best_t[i], Mask<1, Isa>::from_bits(used >> i & 1u));
-            best[first + i].enter_instance(instance_id);
-        }
-        fill(from, best_t, ray + first);
+        none_yet.t.store(hits.t + first);
+        none_yet.u.store(hits.u + first);
+        none_yet.v.store(hits.v + first);
+        none_yet.prim_id.store(hits.prim_id + first);
+        fill(from, hits.t + first, ray + first);
     }
 
     PACKET_INLINE SingleRay single(int r) const {
@@ -107,7 +112,7 @@ struct StreamEntry {
 template <class Isa>
 struct Stream {
     StreamRays<Isa> rays;
-    RaySet looking = 0;  ///< rays that may still find something
+    RaySet looking = 0;  ///< rays that may still find something: for any-hit, that have not yet
     int size = 0;
     // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
     StreamEntry stack[kMaxDepth * (kWideSize - 1) + kWideSize];
@@ -124,8 +129,7 @@ struct WholeTree {
 template <Query query, class Isa, class Stats>
 class StreamWalk {
 public:
-    PACKET_INLINE StreamWalk(const TreeView& tree, std::int32_t instance_id, Stats& stats)
-        : tree_(tree), instance_id_(instance_id), stats_(stats) {}
+    PACKET_INLINE StreamWalk(const TreeView& tree, Stats& stats) : tree_(tree), stats_(stats) {}
 
     /// Enters the subtree of a node with those of `entering` that are looking.
     PACKET_INLINE void start(Stream<Isa>& stream, std::uint32_t root, RaySet entering) const {
@@ -258,15 +262,18 @@ private:
         shear.shear_x = ray.shear_x;
         shear.shear_y = ray.shear_y;
         meet_block(shear, rays.single(r), ray.best_t, block, [&](const BlockHit& hit) {
-            BestHits<1, Isa>& best = rays.best[r];
-            best.template update<query>(hit, instance_id_);
-            ray.best_t = best.t.r[0];
-            if (query == Query::kAny) stream.looking &= ~(RaySet{1} << r);
+            if constexpr (query == Query::kAny) {
+                stream.looking &= ~(RaySet{1} << r);
+            } else if (hit.t < ray.best_t || hit.prim_id < rays.hits.prim_id[r]) {
+                ray.best_t = rays.hits.t[r] = hit.t;
+                rays.hits.u[r] = hit.u;
+                rays.hits.v[r] = hit.v;
+                rays.hits.prim_id[r] = hit.prim_id;
+            }
         });
     }
 
     const TreeView& tree_;
-    std::int32_t instance_id_;
     Stats& stats_;
     const RayBits bits_;
 };

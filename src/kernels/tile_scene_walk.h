@@ -1,5 +1,5 @@
 // Traces a tile: its rays are walked in beams as large as their directions allow, halved until they
-// do; what fits into none is traced ray by ray.
+// do; what fits into none goes packet by packet.
 #pragma once
 
 #include "kernels/scene_walk.h"
@@ -13,7 +13,7 @@ namespace packet {
 inline constexpr float kWidestBeam = 0.25f;
 
 /// The packets of a tile in a mesh.
-template <Query query, int N, class Isa, class Stats, class Singly>
+template <Query query, int N, class Isa, class Stats, class Alone>
 struct TileTracer {
     const TreeView& tree;
     std::int32_t instance_id;
@@ -22,14 +22,14 @@ struct TileTracer {
     std::uint32_t active;  ///< packets with a lane to trace
     TileUse& use;
     Stats& stats;
-    Singly& singly;  ///< traces the rays of one packet
+    Alone& alone;  ///< traces one packet
 
     [[gnu::noinline]] void trace(int first, int last) {
         while (first < last && (active >> first & 1u) == 0) ++first;
         while (first < last && (active >> (last - 1) & 1u) == 0) --last;
         if (first == last || walk_beam(first, last)) return;
         if (last - first == 1) {
-            singly(first);
+            alone(first);
             return;
         }
         const int middle = (first + last) / 2;

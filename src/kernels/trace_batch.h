@@ -119,16 +119,13 @@ PACKET_INLINE void trace_tile(const SceneView& scene, const RayColumns& rays, in
         best[p].enter_instance(instance_id);
         prepare(prepared[p], tree, loaded.ray, loaded.active.bits());
     }
-    std::uint32_t done = 0;  // what has been traced singly is in `out`
-    const auto singly = [&](int p) {
+    std::uint32_t done = 0;  // the packets whose hits are in `out`
+    const auto alone = [&](int p) {
         done |= 1u << p;
-        for (int first = p * N; first < p * N + N; first += kSingleLanes) {
-            trace_singly<query>(scene, rays, lanes_below<kSingleLanes>(count, first), stats, out,
-                                first);
-        }
+        trace_packet<query, N>(scene, rays, lanes_below<N>(count, p * N), stats, out, p * N);
     };
-    TileTracer<query, N, Isa, Stats, decltype(singly)> tracer{
-        tree, instance_id, prepared, best, active, use, stats, singly};
+    TileTracer<query, N, Isa, Stats, decltype(alone)> tracer{tree,   instance_id, prepared, best,
+                                                             active, use,         stats,    alone};
     tracer.trace(0, kTilePackets<N>);
     for (int p = 0; p * N < count; ++p) {
         if ((done >> p & 1u) == 0) store_hits(best[p], out, p * N);
@@ -296,16 +293,16 @@ private:
     PACKET_INLINE void trace_rays(std::size_t begin, int count) {
         const RayColumns columns = gather_rays(batch_, begin, count, rays_);
         prefetch_rays(batch_, begin + static_cast<std::size_t>(count), kTileRays);
-        if (share_class<N, Isa>(columns.component + 4, count)) {
+        if (class_run<N, Isa>(columns.component + 4, count) == count) {
             trace_tile<query, N>(*batch_.scene, columns, count, use_, stats_, hits_);
             scatter_hits<query>(batch_, begin, count, hits_);
             return;
         }
         const ClassRuns<kTileRays> runs(columns.component + 4, count);
         if (runs.used > kMostClasses) {
-            for (int first = 0; first < count; first += kSingleLanes) {
-                trace_singly<query>(*batch_.scene, columns, lanes_below<kSingleLanes>(count, first),
-                                    stats_, hits_, first);
+            for (int first = 0; first < count; first += N) {
+                trace_packet<query, N>(*batch_.scene, columns, lanes_below<N>(count, first), stats_,
+                                       hits_, first);
             }
             scatter_hits<query>(batch_, begin, count, hits_);
             return;

@@ -29,7 +29,7 @@ public:
           tree_(*instance.tree),
           instance_id_(static_cast<std::int32_t>(instance.instance_id)),
           stats_(batch.rays.stats),
-          walk_(tree_, instance_id_, stats_) {}
+          walk_(tree_, stats_) {}
 
     PACKET_INLINE void run() {
         const std::size_t all = batch_.rays.count;
@@ -37,7 +37,7 @@ public:
             const int most =
                 all - begin < kStreamRays ? static_cast<int>(all - begin) : kStreamRays;
             RayColumns columns = gather_rays(batch_.rays, begin, most, gathered_);
-            const int count = class_run(columns.component + 4, most);
+            const int count = class_run<kSingleLanes, Isa>(columns.component + 4, most);
             if (batch_.best_t != nullptr) columns.component[7] = batch_.best_t + begin;
             load(columns, begin, count);
             run_stream();
@@ -48,16 +48,14 @@ public:
 
 private:
     PACKET_INLINE void load(const RayColumns& columns, std::size_t begin, int count) {
-        load_stream(stream_, tree_, columns, count, instance_id_);
+        load_stream(stream_, tree_, columns, count);
         stats_.treelet_stream(count);
         begin_ = begin;
         if (batch_.best_t == nullptr) return;
         for (int r = 0; r < count; ++r) {
             const std::int32_t prim_id = batch_.prim_id[begin + static_cast<std::size_t>(r)];
             if (prim_id < 0) continue;
-            stream_.rays.best[r].prim_id = prim_id;
-            stream_.rays.best[r].tie_prim_id = prim_id;
-            stream_.rays.best[r].instance_id = instance_id_;
+            stream_.rays.hits.prim_id[r] = prim_id;
         }
     }
 
@@ -90,26 +88,32 @@ private:
         }
     }
 
-    PACKET_INLINE void write_hit(const BestHits<1, Isa>& best, Hit& out) const {
-        out.t = best.t.r[0], out.u = best.u.r[0], out.v = best.v.r[0];
-        out.prim_id = static_cast<std::uint32_t>(best.prim_id.r[0]);
+    PACKET_INLINE void write_hit(int r, Hit& out) const {
+        const StreamHits& hits = stream_.rays.hits;
+        out.t = hits.t[r], out.u = hits.u[r], out.v = hits.v[r];
+        out.prim_id = static_cast<std::uint32_t>(hits.prim_id[r]);
         out.mesh_id = mesh_of(*batch_.rays.scene, instance_id_);
         out.instance_id = static_cast<std::uint32_t>(instance_id_);
     }
 
     /// Where rays have found something, or something nearer.
     PACKET_INLINE void store(std::size_t begin, int count) {
+        if constexpr (query == Query::kAny) {
+            for (RaySet left = stream_.rays.active & ~stream_.looking; left != 0;
+                 left &= left - 1) {
+                batch_.rays.occluded[batch_.rays.order[begin + lowest(left)]] = 1;
+            }
+            return;
+        }
         for (int r = 0; r < count; ++r) {
             const std::size_t at = begin + static_cast<std::size_t>(r);
             const std::int32_t had = batch_.best_t != nullptr ? batch_.prim_id[at] : -1;
-            const std::int32_t has = stream_.rays.best[r].prim_id.r[0];
-            if (has == kNoId || has == had) continue;
-            if constexpr (query == Query::kAny) {
-                batch_.rays.occluded[batch_.rays.order[at]] = 1;
-            } else {
-                write_hit(stream_.rays.best[r], batch_.rays.hits[batch_.rays.order[at]]);
-            }
+            const std::int32_t has = stream_.rays.hits.prim_id[r];
+            if (has != kNoId && has != had) write_hit(r, batch_.rays.hits[batch_.rays.order[at]]);
         }
+    }
+    PACKET_INLINE static std::size_t lowest(RaySet rays) {
+        return static_cast<std::size_t>(__builtin_ctzll(rays));
     }
 
     const TreeletBatch& batch_;

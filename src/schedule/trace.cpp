@@ -19,10 +19,8 @@ namespace packet {
 
 namespace {
 
-// Packets of 16 are tried beside single rays this many times, each time on neighbouring tasks,
-constexpr std::size_t kTrialPairs = 5;
-// if that is so little of the whole that the slower tries do not count.
-constexpr std::size_t kLeastTasksForTrial = 128;
+// Packets are tried if that is so little of the whole that the slower tries do not count.
+constexpr std::size_t kLeastTasksForTrial = 512;
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
@@ -38,7 +36,7 @@ public:
           plan_(make_plan(scene_, rays, query, options.mode, parallel_.threads())),
           tasks_(plan_.sorting != Sorting::kNone ? RayTasks::sorted(rays, parallel_.threads())
                                                  : RayTasks(rays, options.width)),
-          tries_(plan_.is_trial && tasks_.count() >= kLeastTasksForTrial) {
+          tries_(plan_.least_wins != 0 && tasks_.count() >= kLeastTasksForTrial) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
                                                   "; it must be 0 (no image) or more");
@@ -121,6 +119,7 @@ private:
     template <class KernelOf>
     [[nodiscard]] KernelTable::Kernel try_packets(const KernelOf& kernel,
                                                   const TraceBatch& batch) const {
+        const KernelTable::Kernel planned = plan_.kernel;
         std::size_t won_by_packets = 0;
         for (std::size_t pair = 0; pair < kTrialPairs; ++pair) {
             const auto time = [&](std::size_t member, KernelTable::Kernel which) {
@@ -131,13 +130,13 @@ private:
             // Who comes first finds the scene out of the cache: they take turns.
             if (pair % 2 == 0) {
                 const auto packets = time(0, KernelTable::kPacket16);
-                won_by_packets += packets < time(1, KernelTable::kSingle);
+                won_by_packets += packets < time(1, planned);
             } else {
-                const auto other = time(0, KernelTable::kSingle);
+                const auto other = time(0, planned);
                 won_by_packets += time(1, KernelTable::kPacket16) < other;
             }
         }
-        return 2 * won_by_packets > kTrialPairs ? KernelTable::kPacket16 : KernelTable::kSingle;
+        return won_by_packets >= plan_.least_wins ? KernelTable::kPacket16 : planned;
     }
 
     void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {

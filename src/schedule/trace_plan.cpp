@@ -58,7 +58,11 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
     const bool may_stream = rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
     const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
     if (is_coherent) {
-        if (!may_stream || query == TraceQuery::kClosest) return {KernelTable::kTile};
+        if (!may_stream || query == TraceQuery::kClosest) {
+            // Neighbouring tasks of an image differ by more than tiles and packets mostly do.
+            constexpr std::size_t kNearlyAll = kTrialPairs - 1;
+            return {.kernel = KernelTable::kTile, .least_wins = kNearlyAll};
+        }
         return {KernelTable::kSorted, Sorting::kByTask};
     }
     if (has_treelets(scene.view) && rays.size() >= kLeastRaysTogether &&
@@ -66,7 +70,7 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
         return plan_treelets();
     }
     if (may_stream) return plan_streams(scene, rays);
-    return {.kernel = KernelTable::kSingle, .is_trial = true};
+    return {.kernel = KernelTable::kSingle, .least_wins = kTrialPairs / 2 + 1};
 }
 
 }  // namespace

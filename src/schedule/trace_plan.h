@@ -19,11 +19,14 @@ enum class Sorting {
     kTogether  ///< by millions: where neighbours are scattered, those that belong together are far
 };
 
+/// How often packets of 16 are tried beside the planned kernel, if at all.
+inline constexpr std::size_t kTrialPairs = 9;
+
 struct TracePlan {
     KernelTable::Kernel kernel;
     Sorting sorting = Sorting::kNone;
-    bool is_trial = false;     ///< whether packets are tried, too
-    bool by_treelets = false;  ///< by kernels of their own
+    std::size_t least_wins = 0;  ///< of kTrialPairs, for packets of 16 to be taken; 0: no trial
+    bool by_treelets = false;    ///< by kernels of their own
 };
 
 /// `Mode::kAuto` looks at a sample of the rays: docs/benchmarking.md#beside-embree. O(1), and
