@@ -244,6 +244,9 @@ TEST_CASE("auto sweeps where the tree is beyond the cache and rays pay for fetch
     CHECK(sweeps(std::nullopt, 200'000));
     CHECK(!sweeps(std::nullopt, 100'000));
     CHECK(!sweeps(0, 200'000));
+    BuildOptions fast;
+    fast.accel = AccelKind::kBvhMorton;
+    CHECK(build_tree(mesh.view(), fast).treelets.begin.empty());
 }
 
 TEST_CASE("options out of range are refused") {

@@ -1,5 +1,5 @@
 // Cuts the 8-wide form of a tree into treelets: parts of so many bytes that one stays in a core's
-// cache while many rays go through it (src/schedule/treelet_scheduler.h). A treelet is a node, its
+// cache while many rays go through it (src/schedule/treelet_sweep.h). A treelet is a node, its
 // root, and nodes below it that hang together. So a link that leaves a treelet leads to the root of
 // another, and a ray that walks down enters each at most once.
 //
