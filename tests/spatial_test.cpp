@@ -131,7 +131,7 @@ TEST_CASE("a plane that costs least parts the references as it was said to") {
     const TriangleMesh mesh = make_diagonals(500, 5);
     ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     const NodeRange node = whole_node(references, 700, parallel);
-    const SpatialSplit split = find_spatial_split(mesh.view(), node, parallel);
+    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel);
     REQUIRE(split.axis >= 0);
     const auto halves = split_space(mesh.view(), node, split, 0, parallel);
     REQUIRE(halves.has_value());
@@ -160,7 +160,7 @@ TEST_CASE("with less room than a plane cuts triangles, as many are cut as there 
     const TriangleMesh mesh = make_diagonals(500, 6);
     ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     NodeRange node = whole_node(references, 1000, parallel);
-    const SpatialSplit split = find_spatial_split(mesh.view(), node, parallel);
+    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel);
     node.room = 3;
     const auto halves = split_space(mesh.view(), node, split, 0, parallel);
     REQUIRE(halves.has_value());
@@ -173,7 +173,7 @@ TEST_CASE("a plane is none where the halves might not fit the depth") {
     const TriangleMesh mesh = make_diagonals(500, 7);
     ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     const NodeRange node = whole_node(references, 500, parallel);
-    const SpatialSplit split = find_spatial_split(mesh.view(), node, parallel);
+    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel);
     CHECK(!split_space(mesh.view(), node, split, kMaxDepth - 5, parallel).has_value());
 }
 

@@ -63,7 +63,8 @@ struct BuildOptions {
     int max_leaf_size = 8;
     /// Cost of visiting a node, in triangle tests. Raise it for flatter trees with larger leaves.
     float traversal_cost = 1.0f;
-    /// Cost of testing a triangle. Only its ratio to `traversal_cost` matters.
+    /// Cost of testing a triangle. Only its ratio to `traversal_cost` matters. Hierarchies of boxes
+    /// count blocks of 8, which are tested at once, as two.
     float intersection_cost = 1.0f;
     /// References to triangles, at most, in multiples of the triangles, 1 to 64, where cells cut
     /// triangles (k-d trees, octree, grids). A part of the tree that has used up its share parts
@@ -119,8 +120,10 @@ struct BuildStats {
     std::size_t bytes = 0;  ///< memory of nodes and triangle blocks
     std::size_t node_count = 0;
     std::size_t leaf_count = 0;
-    int depth = 0;          ///< edges from the root to the deepest leaf
-    double sah_cost = 0.0;  ///< expected cost of a random ray that meets the root's box
+    int depth = 0;  ///< edges from the root to the deepest leaf
+    /// Expected cost of a random ray that meets the root's box: each node of two children that it
+    /// meets is `traversal_cost`, each block of up to 8 triangles of a leaf 2 `intersection_cost`.
+    double sah_cost = 0.0;
     SkippedTriangles skipped;
     TreeletStats treelets;
 };

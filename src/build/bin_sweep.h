@@ -3,6 +3,7 @@
 #pragma once
 
 #include "build/lane_box.h"
+#include "build/sah_costs.h"
 
 #include <cstdint>
 #include <limits>
@@ -28,6 +29,23 @@ struct AxisCounts {
     }
 };
 
+/// What halves of a node are counted by: references, or the blocks they fill.
+class CountUnit {
+public:
+    CountUnit(std::size_t node_count, const SahCosts& costs) {
+        if (!costs.counts_blocks(node_count)) return;
+        const auto size = static_cast<float>(costs.block_size);
+        per_reference_ = Lanes(1.0f / size);
+        to_next_ = Lanes(1.0f - 0.5f / size);
+    }
+    [[nodiscard]] PACKET_INLINE Lanes of(Lanes references) const noexcept {
+        return xsimd::to_float(xsimd::to_int(references * per_reference_ + to_next_));
+    }
+
+private:
+    Lanes per_reference_ = Lanes(1.0f), to_next_ = Lanes(0.0f);
+};
+
 /// What is on one side of a border, by axis.
 struct SweepSide {
     LaneBox box[3];
@@ -38,8 +56,8 @@ struct SweepSide {
         count.add(counts);
     }
     /// Area times count.
-    [[nodiscard]] PACKET_INLINE Lanes costs() const noexcept {
-        return half_areas(box) * count.lanes();
+    [[nodiscard]] PACKET_INLINE Lanes costs(const CountUnit& unit) const noexcept {
+        return half_areas(box) * unit.of(count.lanes());
     }
 };
 
@@ -52,19 +70,20 @@ struct Borders {
 /// Bins have a `box` for each axis, and counts of what `begins` and what `ends` in them. A border
 /// with more than `most` references on both sides together is none.
 template <class Bin>
-[[nodiscard]] Borders find_borders(const Bin (&bins)[kBinCount], float most) noexcept {
+[[nodiscard]] Borders find_borders(const Bin (&bins)[kBinCount], const CountUnit& unit,
+                                   float most) noexcept {
     Lanes cost_above[kBinCount], count_above[kBinCount];
     SweepSide above;
     for (int i = kBinCount - 1; i > 0; --i) {
         above.add(bins[i].box, bins[i].ends());
-        cost_above[i] = above.costs();
+        cost_above[i] = above.costs(unit);
         count_above[i] = above.count.lanes();
     }
     SweepSide below;
     Lanes best(std::numeric_limits<float>::infinity()), best_bin(0.0f);
     for (int i = 1; i < kBinCount; ++i) {
         below.add(bins[i - 1].box, bins[i - 1].begins());
-        const Lanes cost = below.costs() + cost_above[i];
+        const Lanes cost = below.costs(unit) + cost_above[i];
         const auto is_best = (cost < best) & (below.count.lanes() + count_above[i] <= Lanes(most));
         best = xsimd::select(is_best, cost, best);
         best_bin = xsimd::select(is_best, Lanes(static_cast<float>(i)), best_bin);

@@ -6,6 +6,7 @@
 // Karras. Maximizing parallelism in the construction of BVHs, octrees, and k-d trees. HPG 2012.
 #include "build/bvh_morton.h"
 
+#include "build/lane_box.h"
 #include "build/radix_hierarchy.h"
 #include "build/split.h"
 #include "core/macros.h"
@@ -22,7 +23,7 @@ namespace {
 // Pieces of loops whose work is a few dozen nanoseconds an item.
 constexpr std::size_t kGrain = 8192;
 // References of a subtree that one task builds: its nodes stay in the second level's cache.
-constexpr std::uint32_t kTaskSize = 1024;
+constexpr std::uint32_t kTaskSize = 4096;
 // References whose boxes are fetched ahead: they lie anywhere.
 constexpr std::uint32_t kAhead = 8;
 
@@ -31,25 +32,22 @@ constexpr double kShareOfSort = 0.5;
 
 /// A subtree whose root has no place yet.
 struct Rooted {
-    BuildNode root;
+    LaneBox box;
     RadixSubtree subtree;
+    std::uint32_t first, second;  ///< places of the root's children, if it is no leaf
+
+    [[nodiscard]] BuildNode root() const {
+        if (subtree.height == 0) return {box.bounds(), subtree.first, 0, subtree.count};
+        return {box.bounds(), first, second, 0};
+    }
 };
 
 /// The inner node or leaf that two subtrees make, whose roots are, or will be, at these places.
 PACKET_INLINE Rooted join(const Rooted& a, const Rooted& b, std::uint32_t place_a,
                           std::uint32_t place_b, const LeafRule& rule) {
-    Rooted out;
-    out.root.bounds = a.root.bounds;
-    out.root.bounds.extend(b.root.bounds);
-    out.subtree = rule.join(a.subtree, b.subtree, out.root.bounds.half_area());
-    if (out.subtree.height == 0) {
-        out.root.first = out.subtree.first;
-        out.root.count = out.subtree.count;
-    } else {
-        out.root.first = place_a;
-        out.root.second = place_b;
-    }
-    return out;
+    LaneBox box = a.box;
+    box.extend(b.box);
+    return {box, rule.join(a.subtree, b.subtree, half_area(box)), place_a, place_b};
 }
 
 /// Builds the subtree over a range of sorted items from right to left. Of neighbours, those whose
@@ -68,20 +66,23 @@ public:
     /// Over items `first` to `last`, whose ids it fills in. Children are in nodes(), and referred
     /// to by their place there.
     Rooted build(std::uint32_t first, std::uint32_t last) {
-        nodes_.clear();
-        nodes_.reserve(2 * std::size_t{last - first + 1});
+        nodes_.resize(2 * std::size_t{last - first + 1});
+        used_ = 0;
         int depth = 0;
         for (std::uint32_t i = last + 1; i-- > first;) {
             const int bits = i == first ? -1 : keys_.common_bits(i - 1, i);
-            stack_[depth++] = {make_leaf(i), static_cast<std::uint32_t>(nodes_.size()), bits};
-            for (; depth > 1 && stack_[depth - 2].bits > bits; --depth) {
-                join_top(stack_[depth - 1], stack_[depth - 2]);
+            Entry left = {make_leaf(i), used_, bits};
+            for (; depth > 0 && stack_[depth - 1].bits > bits; --depth) {
+                join_right(left, stack_[depth - 1]);
             }
+            stack_[depth++] = left;
         }
         return stack_[0].rooted;
     }
     /// Pairs of children, the second before the first.
-    [[nodiscard]] const std::vector<BuildNode>& nodes() const { return nodes_; }
+    [[nodiscard]] std::span<const BuildNode> nodes() const {
+        return std::span(nodes_).first(used_);
+    }
 
 private:
     struct Entry {
@@ -90,25 +91,24 @@ private:
         int bits;             ///< in common with its left neighbour
     };
 
-    Rooted make_leaf(std::uint32_t item) const {
+    PACKET_INLINE Rooted make_leaf(std::uint32_t item) const {
         if (item >= kAhead) __builtin_prefetch(&references_[items_[item - kAhead].index]);
         const Reference& reference = references_[items_[item].index];
-        const Bounds3f bounds = reference.bounds();
+        const LaneBox box = {without_last(lower_lanes(reference)), upper_lanes(reference)};
         ids_[item] = reference.id;
-        return {{bounds, item, 0, 1}, rule_.leaf(item, bounds.half_area())};
+        return {box, rule_.leaf(item, half_area(box)), 0, 0};
     }
-    /// The last one, on the left, with the one before it, which it replaces.
-    void join_top(const Entry& left, Entry& right) {
-        const auto place = static_cast<std::uint32_t>(nodes_.size());
-        const Rooted joined = join(left.rooted, right.rooted, place + 1, place, rule_);
+    /// The last one with its right neighbour, the one before it.
+    PACKET_INLINE void join_right(Entry& left, const Entry& right) {
+        const Rooted joined = join(left.rooted, right.rooted, used_ + 1, used_, rule_);
         if (joined.subtree.height == 0) {
-            nodes_.resize(right.begin);
+            used_ = right.begin;
         } else {
-            nodes_.push_back(right.rooted.root);
-            nodes_.push_back(left.rooted.root);
+            nodes_[used_++] = right.rooted.root();
+            nodes_[used_++] = left.rooted.root();
         }
-        right.rooted = joined;
-        right.bits = left.bits;
+        left.rooted = joined;
+        left.begin = right.begin;
     }
 
     std::span<const MortonItem<Code>> items_;
@@ -116,7 +116,8 @@ private:
     const RadixKeys<Code>& keys_;
     const LeafRule& rule_;
     std::span<std::uint32_t> ids_;  ///< by item
-    std::vector<BuildNode> nodes_;
+    ScratchVector<BuildNode> nodes_;
+    std::uint32_t used_ = 0;
     Entry stack_[kMortonBits<Code> + 33];  ///< each lacks a bit of the key that the last one has
 };
 
@@ -170,7 +171,7 @@ private:
         used_ = 1;
         const RadixKeys<Code> keys(items_, dropped_bits);
         const Rooted all = build_range(keys, 0, static_cast<std::uint32_t>(count_ - 1));
-        nodes_[0] = all.root;
+        nodes_[0] = all.root();
         return all.subtree.height;
     }
 
@@ -182,8 +183,8 @@ private:
         parallel_.both([&] { a = build_range(keys, first, split); },
                        [&] { b = build_range(keys, split + 1, last); });
         const std::uint32_t pair = used_.fetch_add(2, std::memory_order_relaxed);
-        nodes_[pair] = a.root;
-        nodes_[pair + 1] = b.root;
+        nodes_[pair] = a.root();
+        nodes_[pair + 1] = b.root();
         return join(a, b, pair, pair + 1, rule_);
     }
 
@@ -193,14 +194,16 @@ private:
         const auto count = static_cast<std::uint32_t>(builder.nodes().size());
         const std::uint32_t last_place =
             used_.fetch_add(count, std::memory_order_relaxed) + count - 1;
-        const auto move = [last_place](BuildNode node) {
-            if (node.is_leaf()) return node;
-            node.first = last_place - node.first;
-            node.second = last_place - node.second;
-            return node;
-        };
-        for (std::uint32_t i = 0; i < count; ++i) nodes_[last_place - i] = move(builder.nodes()[i]);
-        out.root = move(out.root);
+        for (std::uint32_t i = 0; i < count; ++i) {
+            BuildNode node = builder.nodes()[i];
+            if (!node.is_leaf()) {
+                node.first = last_place - node.first;
+                node.second = last_place - node.second;
+            }
+            nodes_[last_place - i] = node;
+        }
+        out.first = last_place - out.first;
+        out.second = last_place - out.second;
         parallel_.advance((1.0 - kShareOfSort) * static_cast<double>(last - first + 1) /
                           static_cast<double>(count_));
         return out;

@@ -12,26 +12,17 @@ namespace {
 class SahSplit {
 public:
     SahSplit(const BuildOptions& options, const Parallel& parallel)
-        : options_(options), parallel_(parallel) {}
+        : costs_(options), parallel_(parallel) {}
 
     std::optional<Halves> operator()(const NodeRange& node, int depth) const {
-        if (is_surely_leaf(node)) return {};
-        const ObjectSplit split = find_object_split(node, parallel_);
-        if (is_leaf(node, split.cost, options_)) return {};
+        if (is_surely_leaf(node, costs_)) return {};
+        const ObjectSplit split = find_object_split(node, costs_, parallel_);
+        if (is_leaf(node, split.cost, costs_)) return {};
         return split_objects(node, split, depth, parallel_);
     }
 
 private:
-    /// Whether even children that each fit one reference would not pay: half of all leaves are
-    /// found so, without a look for a split.
-    [[nodiscard]] bool is_surely_leaf(const NodeRange& node) const {
-        if (node.refs.size() > kFewReferences) return false;
-        float least_cost = 0.0f;
-        for (const Reference& r : node.refs) least_cost += r.bounds().half_area();
-        return is_leaf(node, least_cost, options_);
-    }
-
-    const BuildOptions& options_;
+    SahCosts costs_;
     const Parallel& parallel_;
 };
 

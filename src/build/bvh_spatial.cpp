@@ -34,14 +34,17 @@ public:
                     const Parallel& parallel)
         : mesh_(mesh),
           least_overlap_(kLeastOfRoot * root_area),
-          options_(options),
+          costs_(options),
           parallel_(parallel) {}
 
     std::optional<Halves> operator()(const NodeRange& node, int depth) const {
-        const ObjectSplit objects = find_object_split(node, parallel_);
+        if (is_surely_leaf(node, costs_)) return {};
+        const ObjectSplit objects = find_object_split(node, costs_, parallel_);
         SpatialSplit space;
-        if (is_worth_cutting(node, objects)) space = find_spatial_split(mesh_, node, parallel_);
-        if (is_leaf(node, std::min(objects.cost, space.cost), options_)) return {};
+        if (is_worth_cutting(node, objects)) {
+            space = find_spatial_split(mesh_, node, costs_, parallel_);
+        }
+        if (is_leaf(node, std::min(objects.cost, space.cost), costs_)) return {};
         if (space.cost < objects.cost) {
             if (auto halves = split_space(mesh_, node, space, depth, parallel_)) return halves;
         }
@@ -59,7 +62,7 @@ private:
 
     MeshView mesh_;
     float least_overlap_;
-    const BuildOptions& options_;
+    SahCosts costs_;
     const Parallel& parallel_;
 };
 

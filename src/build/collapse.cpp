@@ -89,7 +89,10 @@ public:
     Plan plan(std::uint32_t root, std::uint32_t hang_at, std::vector<Hanging>& hanging) {
         hang_at_ = hang_at;
         hanging_ = &hanging;
-        if (hang_at == 0) out_.id_of_item.reserve(std::size_t{2} * cuts_.item_count(root));
+        if (hang_at == 0) {
+            out_.id_of_item.reserve(std::size_t{2} * cuts_.item_count(root));
+            out_.nodes.reserve(cuts_.item_count(root) / 8);
+        }
         emit(root);
         return std::move(out_);
     }

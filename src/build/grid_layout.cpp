@@ -1,5 +1,6 @@
 #include "build/grid_layout.h"
 
+#include "build/sah_costs.h"
 #include "build/triangle_block.h"
 
 #include <algorithm>
@@ -80,6 +81,15 @@ void lay_out(const CellLists& cells, std::uint32_t longest, const Piece& piece, 
     }
 }
 
+/// With what probability a random ray that meets the grid meets a certain cell: the ratio of their
+/// areas. (Cells are all about the same size.)
+double cell_share(const GridSpace& space) {
+    const glm::dvec3 box(space.bounds().extent());
+    const glm::dvec3 cell = box / glm::dvec3(space.side(0), space.side(1), space.side(2));
+    const auto area = [](const glm::dvec3& e) { return e.x * e.y + e.y * e.z + e.z * e.x; };
+    return area(box) > 0.0 ? area(cell) / area(box) : 1.0;
+}
+
 }  // namespace
 
 Tree make_grid(const CellLists& cells, std::uint32_t longest, MeshView mesh,
@@ -99,11 +109,16 @@ Tree make_grid(const CellLists& cells, std::uint32_t longest, MeshView mesh,
     return out;
 }
 
-double cell_share(const GridSpace& space) {
-    const glm::dvec3 box(space.bounds().extent());
-    const glm::dvec3 cell = box / glm::dvec3(space.side(0), space.side(1), space.side(2));
-    const auto area = [](const glm::dvec3& e) { return e.x * e.y + e.y * e.z + e.z * e.x; };
-    return area(box) > 0.0 ? area(cell) / area(box) : 1.0;
+double expected_cost(const CellLists& cells, std::uint32_t longest, const BuildOptions& options) {
+    std::size_t blocks = 0;
+    for (const CellList& list : cells.lists) {
+        if (list.count <= longest) blocks += (list.count + kBlockSize - 1) / kBlockSize;
+    }
+    const double of_cells =
+        static_cast<double>(options.traversal_cost) * static_cast<double>(cells.space.cell_count());
+    const double of_blocks =
+        static_cast<double>(kBlockTests * options.intersection_cost) * static_cast<double>(blocks);
+    return cell_share(cells.space) * (of_cells + of_blocks);
 }
 
 }  // namespace packet

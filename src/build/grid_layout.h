@@ -12,8 +12,8 @@ namespace packet {
 [[nodiscard]] Tree make_grid(const CellLists& cells, std::uint32_t longest, MeshView mesh,
                              const Parallel& parallel);
 
-/// With what probability a random ray that meets the grid meets a certain cell: the ratio of their
-/// areas. (Cells are all about the same size.)
-[[nodiscard]] double cell_share(const GridSpace& space);
+/// As BuildStats::sah_cost: each cell as a node, and the blocks of lists of up to `longest`.
+[[nodiscard]] double expected_cost(const CellLists& cells, std::uint32_t longest,
+                                   const BuildOptions& options);
 
 }  // namespace packet

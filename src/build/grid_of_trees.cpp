@@ -17,9 +17,6 @@ namespace {
 constexpr double kCellShare = 1.0 / 128.0;
 // Two blocks: testing both costs about as much as a node that tells which of them to test.
 constexpr std::uint32_t kLongestList = 16;
-// Where a single ray meets eight triangles at once, a node costs as much as eight of them. Trees
-// that know are half as large, and built in two thirds of the time.
-constexpr float kNodeCost = static_cast<float>(kBlockSize);
 // Of the build's time, about.
 constexpr double kShareOfGrid = 0.3, kShareOfTrees = 0.7;
 // Trees of more references than this are built by all threads, one after the other.
@@ -37,10 +34,9 @@ Reference make_reference(MeshView mesh, std::uint32_t id, const Bounds3f& cell) 
 
 class TreesBuilder {
 public:
-    TreesBuilder(const CellLists& cells, MeshView mesh, BuildOptions options,
+    TreesBuilder(const CellLists& cells, MeshView mesh, const BuildOptions& options,
                  const Parallel& parallel)
-        : cells_(cells), mesh_(mesh), options_(std::move(options)), parallel_(parallel) {
-        options_.traversal_cost *= kNodeCost;
+        : cells_(cells), mesh_(mesh), options_(options), parallel_(parallel) {
         for (std::size_t i = 0; i < cells.lists.size(); ++i) {
             if (cells.lists[i].count <= kLongestList) continue;
             crowded_.push_back(i);
@@ -117,7 +113,7 @@ private:
 
     const CellLists& cells_;
     MeshView mesh_;
-    BuildOptions options_;  ///< of the trees
+    const BuildOptions& options_;  ///< of the trees
     const Parallel& parallel_;
     std::vector<std::size_t> crowded_;  ///< lists that become trees
     std::size_t reference_count_ = 0;   ///< in these
@@ -136,15 +132,7 @@ Tree build_grid_of_trees(MeshView mesh, const ScratchVector<Reference>& referenc
             sort_into_cells(mesh, references,
                             kCellShare * static_cast<double>(options.grid_density), options, grid);
         out = make_grid(cells, kLongestList, mesh, grid);
-        std::size_t in_lists = 0;
-        for (const CellList& list : cells.lists) {
-            in_lists += list.count <= kLongestList ? list.count : 0;
-        }
-        const double cost =
-            static_cast<double>(cells.space.cell_count()) *
-                static_cast<double>(options.traversal_cost) +
-            static_cast<double>(in_lists) * static_cast<double>(options.intersection_cost);
-        out.stats.sah_cost = cell_share(cells.space) * cost;
+        out.stats.sah_cost = expected_cost(cells, kLongestList, options);
         TreesBuilder(cells, mesh, options, parallel).add_to(out);
     });
     out.stats.bytes = out.byte_count();

@@ -18,7 +18,8 @@ Binning::Binning(const Bounds3f& centroids) {
 
 namespace {
 
-struct Bin {
+/// Aligned so that a bin's place is its number shifted.
+struct alignas(64) Bin {
     LaneBox box[3];
     AxisCounts count;
 
@@ -33,7 +34,7 @@ struct Bins {
         const LaneBox box = lane_box(r);
         const Binning::BinIds ids = binning.bins(centroid2_lanes(r));
         for (int a = 0; a < 3; ++a) {
-            Bin& at = bin[ids.axis[a]];
+            Bin& at = bin[static_cast<std::uint32_t>(ids.axis[a])];
             at.box[a].extend(box);
             ++at.count.axis[a];
         }
@@ -72,7 +73,7 @@ struct Orders {
 };
 
 /// Tries every place in the orders.
-ObjectSplit split_few(ReferenceSpan refs) {
+ObjectSplit split_few(ReferenceSpan refs, const CountUnit& unit) {
     const std::size_t count = refs.size();
     const Orders orders(refs);
     const auto extend = [&](LaneBox(&box)[3], std::size_t place) {
@@ -82,14 +83,14 @@ ObjectSplit split_few(ReferenceSpan refs) {
     LaneBox above[3], below[3];
     for (std::size_t i = count - 1; i > 0; --i) {
         extend(above, i);
-        cost_above[i] = half_areas(above) * Lanes(static_cast<float>(count - i));
+        cost_above[i] = half_areas(above) * unit.of(Lanes(static_cast<float>(count - i)));
     }
     alignas(16) float least[4], place[4];
     Lanes best(std::numeric_limits<float>::infinity()), best_place(0.0f);
     for (std::size_t i = 1; i < count; ++i) {
         extend(below, i - 1);
         const Lanes here(static_cast<float>(i));
-        const Lanes cost = half_areas(below) * here + cost_above[i];
+        const Lanes cost = half_areas(below) * unit.of(here) + cost_above[i];
         const auto is_best = cost < best;
         best = xsimd::select(is_best, cost, best);
         best_place = xsimd::select(is_best, here, best_place);
@@ -151,8 +152,10 @@ std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, NodeBound
 
 }  // namespace
 
-ObjectSplit find_object_split(const NodeRange& node, const Parallel& parallel) {
-    if (node.refs.size() <= kFewReferences) return split_few(node.refs);
+ObjectSplit find_object_split(const NodeRange& node, const SahCosts& costs,
+                              const Parallel& parallel) {
+    const CountUnit unit(node.refs.size(), costs);
+    if (node.refs.size() <= kFewReferences) return split_few(node.refs, unit);
     ObjectSplit best;
     const Binning& binning = best.binning = Binning(node.bounds.centroids);
     if (!binning.splits_any()) return best;
@@ -162,7 +165,7 @@ ObjectSplit find_object_split(const NodeRange& node, const Parallel& parallel) {
             for (const Reference& r : piece) out.add(r, binning);
         },
         [](Bins& a, const Bins& b) { a.add(b); });
-    const Borders borders = find_borders(bins.bin, std::numeric_limits<float>::infinity());
+    const Borders borders = find_borders(bins.bin, unit, std::numeric_limits<float>::infinity());
     for (int a = 0; a < 3; ++a) {
         if (!binning.splits(a) || !(borders.cost[a] < best.cost)) continue;
         best.cost = borders.cost[a];
@@ -175,12 +178,19 @@ ObjectSplit find_object_split(const NodeRange& node, const Parallel& parallel) {
     return best;
 }
 
-bool is_leaf(const NodeRange& node, float split_cost, const BuildOptions& options) {
+bool is_leaf(const NodeRange& node, float split_cost, const SahCosts& costs) {
     const std::size_t count = node.refs.size();
-    if (count > static_cast<std::size_t>(options.max_leaf_size)) return false;
+    if (count > costs.max_leaf_size) return false;
     const float area = node.bounds.box.half_area();
-    const float as_leaf = options.intersection_cost * area * static_cast<float>(count);
-    return !(options.traversal_cost * area + options.intersection_cost * split_cost < as_leaf);
+    const float as_leaf = costs.leaf(area, static_cast<std::uint32_t>(count));
+    return !(costs.node * area + costs.block * split_cost < as_leaf);
+}
+
+bool is_surely_leaf(const NodeRange& node, const SahCosts& costs) {
+    if (node.refs.size() > kFewReferences) return false;
+    float least_cost = 0.0f;
+    for (const Reference& r : node.refs) least_cost += r.bounds().half_area();
+    return is_leaf(node, least_cost, costs);
 }
 
 Halves split_objects(const NodeRange& node, const ObjectSplit& split, int depth,

@@ -8,8 +8,6 @@
 #include "build/bin_sweep.h"
 #include "build/lane_bounds.h"
 
-#include <packet/accel.h>
-
 #include <cstdint>
 #include <limits>
 
@@ -47,7 +45,7 @@ private:
 };
 
 struct ObjectSplit {
-    float cost = std::numeric_limits<float>::infinity();  ///< of both halves: area times count
+    float cost = std::numeric_limits<float>::infinity();  ///< of both halves: area times CountUnit
     int axis = -1;                                        ///< -1: none
     int place = 0;                       ///< bins below this go first, or so many if they are few
     Bounds3f bounds[2];                  ///< of the halves
@@ -57,10 +55,15 @@ struct ObjectSplit {
 
 /// The cheapest split, if centroids can be told apart. O(references), on several threads if they
 /// are many.
-[[nodiscard]] ObjectSplit find_object_split(const NodeRange& node, const Parallel& parallel);
+[[nodiscard]] ObjectSplit find_object_split(const NodeRange& node, const SahCosts& costs,
+                                            const Parallel& parallel);
 
 /// Whether a node is better a leaf, and may be one, than split at a cost of area times count.
-[[nodiscard]] bool is_leaf(const NodeRange& node, float split_cost, const BuildOptions& options);
+[[nodiscard]] bool is_leaf(const NodeRange& node, float split_cost, const SahCosts& costs);
+
+/// Whether not even children that each hold one reference would pay: most leaves are found so,
+/// without a look for a split. That halves of several may cost less changes one leaf in a thousand.
+[[nodiscard]] bool is_surely_leaf(const NodeRange& node, const SahCosts& costs);
 
 /// Parts the references; where a split is none, or not allowed at this depth, into equal halves.
 /// Halves of few references do not get the bounds of their centroids, which nothing asks for.

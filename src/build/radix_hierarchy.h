@@ -6,6 +6,7 @@
 
 #include "build/hierarchy.h"
 #include "build/radix_tree.h"
+#include "build/sah_costs.h"
 
 #include <packet/accel.h>
 
@@ -23,26 +24,24 @@ struct RadixSubtree {
 
 /// When a node is a leaf: when that is cheaper, and it is not too large.
 struct LeafRule {
-    float traversal_cost, intersection_cost;
-    std::uint32_t max_leaf_size;
+    SahCosts costs;
 
     /// A node of two subtrees. It is a leaf, of height 0, if the rule says so.
     [[nodiscard]] constexpr RadixSubtree join(const RadixSubtree& a, const RadixSubtree& b,
                                               float area) const {
         const std::uint32_t count = a.count + b.count;
-        const float as_leaf = intersection_cost * area * static_cast<float>(count);
-        const float as_node = traversal_cost * area + a.cost + b.cost;
-        if (count <= max_leaf_size && !(as_node < as_leaf)) return {a.first, count, as_leaf, 0};
+        const float as_node = costs.node * area + a.cost + b.cost;
+        if (count <= costs.max_leaf_size) {
+            const float as_leaf = costs.leaf(area, count);
+            if (!(as_node < as_leaf)) return {a.first, count, as_leaf, 0};
+        }
         return {a.first, count, as_node, 1 + std::max(a.height, b.height)};
     }
     [[nodiscard]] constexpr RadixSubtree leaf(std::uint32_t item, float area) const {
-        return {item, 1, intersection_cost * area, 0};
+        return {item, 1, costs.leaf(area, 1), 0};
     }
 
-    explicit LeafRule(const BuildOptions& options)
-        : traversal_cost(options.traversal_cost),
-          intersection_cost(options.intersection_cost),
-          max_leaf_size(static_cast<std::uint32_t>(options.max_leaf_size)) {}
+    explicit LeafRule(const BuildOptions& options) : costs(options) {}
 };
 
 /// Arrays over n sorted references. Inner nodes have the slots below n - 1, and leaf i has slot

@@ -134,7 +134,8 @@ struct Slices {
 
 }  // namespace
 
-SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const Parallel& parallel) {
+SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const SahCosts& costs,
+                                const Parallel& parallel) {
     const Slicing slicing(node.bounds.box);
     const auto slices = fold_references<Slices>(
         node.refs, parallel,
@@ -142,7 +143,8 @@ SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const Para
             for (const Reference& r : piece) out.add(r, slicing, mesh);
         },
         [](Slices& a, const Slices& b) { a.add(b); });
-    const Borders borders = find_borders(slices.slice, static_cast<float>(node.capacity()));
+    const Borders borders = find_borders(slices.slice, CountUnit(node.refs.size(), costs),
+                                         static_cast<float>(node.capacity()));
     SpatialSplit best;
     int plane = 0;
     for (int a = 0; a < 3; ++a) {

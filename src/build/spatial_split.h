@@ -5,6 +5,7 @@
 // Graphics 2009.
 #pragma once
 
+#include "build/sah_costs.h"
 #include "build/split.h"
 
 #include <cstddef>
@@ -24,7 +25,7 @@ struct SpatialSplit {
 /// The cheapest plane among those that add no more references than the node has room for.
 /// O(references), on several threads if they are many.
 [[nodiscard]] SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node,
-                                              const Parallel& parallel);
+                                              const SahCosts& costs, const Parallel& parallel);
 
 /// Parts the references at the plane. Those that reach to both sides are cut, if there is room, or
 /// go whole to one side where that is expected to cost less. None, and nothing is cut, where that

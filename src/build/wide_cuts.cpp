@@ -1,5 +1,6 @@
 #include "build/wide_cuts.h"
 
+#include "build/sah_costs.h"
 #include "core/macros.h"
 
 #include <algorithm>
@@ -9,10 +10,10 @@ namespace packet {
 
 namespace {
 
-// Expected cost of a wide node, and of a block of triangles. Instructions would say 1 to 4, but
-// half of the blocks are met for nothing and left early; from 2 to 3 speeds do not differ.
+// Expected cost of a wide node, and of a block of triangles. Half of the blocks are met for nothing
+// and left early: docs/benchmarking.md#quality-of-hierarchies
 constexpr float kNodeCost = 1.0f;
-constexpr float kBlockCost = 2.0f;
+constexpr float kBlockCost = 1.0f;
 // Nodes of a task, about, in balanced trees: 100 us of work.
 constexpr std::size_t kTaskNodes = 4096;
 
@@ -58,7 +59,7 @@ WideCuts::Weight WideCuts::weigh(std::uint32_t id, int depth) {
     out.height = 1 + std::max(first.height, second.height);
     out.leaf_count = first.leaf_count + second.leaf_count;
     out.inner_area = static_cast<double>(area) + first.inner_area + second.inner_area;
-    out.item_area = first.item_area + second.item_area;
+    out.block_area = first.block_area + second.block_area;
     cut = {0, out.items};
     if (!is_given()) choose(best_splits(first, second), area, out, cut);
     return out;
@@ -73,7 +74,7 @@ WideCuts::Weight WideCuts::weigh_leaf(const BuildNode& node, Cut& cut) const {
     out.height = 0;
     out.leaf_count = 1;
     out.inner_area = 0.0;
-    out.item_area = static_cast<double>(area) * static_cast<double>(node.count);
+    out.block_area = static_cast<double>(area) * static_cast<double>(blocks);
     cut = {0, node.count};
     return out;
 }
@@ -171,9 +172,10 @@ BuildStats WideCuts::stats(const BuildOptions& options) const {
     out.depth = root_.height;
     const double root_area = std::max(static_cast<double>(nodes_[0].bounds.half_area()),
                                       std::numeric_limits<double>::min());
-    out.sah_cost = (static_cast<double>(options.traversal_cost) * root_.inner_area +
-                    static_cast<double>(options.intersection_cost) * root_.item_area) /
-                   root_area;
+    out.sah_cost =
+        (static_cast<double>(options.traversal_cost) * root_.inner_area +
+         static_cast<double>(kBlockTests * options.intersection_cost) * root_.block_area) /
+        root_area;
     return out;
 }
 

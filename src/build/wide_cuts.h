@@ -59,7 +59,7 @@ private:
         std::uint32_t items;
         int height;
         std::size_t leaf_count;
-        double inner_area, item_area;  ///< sums: of inner nodes' boxes, and of leaves' by item
+        double inner_area, block_area;  ///< sums: of inner nodes' boxes, and of leaves' by block
     };
 
     [[nodiscard]] bool is_given() const noexcept { return !hierarchy_.is_wide_child.empty(); }
