@@ -207,15 +207,16 @@ TEST_CASE("scenes that are not one tree, or not cut, are traced all the same") {
 
 TEST_CASE("auto sweeps where the tree is beyond the cache and rays pay for fetching it") {
     constexpr std::size_t kMega = 1'000'000;
-    CHECK(sweeps_beat_streams(kMega, 170 * kMega, 1));
-    CHECK(sweeps_beat_streams(kMega, 170 * kMega, 2));
-    CHECK(!sweeps_beat_streams(kMega, 170 * kMega, 64));
-    CHECK(!sweeps_beat_streams(kMega, 5 * kMega, 1));
-    CHECK(!sweeps_beat_streams(kMega, 10'000 * kMega, 1));
+    CHECK(sweeps_beat_streams(kMega, 170 * kMega, 200.0, 1));
+    CHECK(sweeps_beat_streams(kMega, 170 * kMega, 200.0, 2));
+    CHECK(!sweeps_beat_streams(kMega, 170 * kMega, 50.0, 1));
+    CHECK(!sweeps_beat_streams(kMega, 170 * kMega, 200.0, 64));
+    CHECK(!sweeps_beat_streams(kMega, 5 * kMega, 200.0, 1));
+    CHECK(!sweeps_beat_streams(kMega, 10'000 * kMega, 200.0, 1));
     // More than are sorted together make no sweep longer.
-    CHECK(!sweeps_beat_streams(100 * kMega, 10'000 * kMega, 1));
+    CHECK(!sweeps_beat_streams(100 * kMega, 10'000 * kMega, 200.0, 1));
 
-    const TriangleMesh mesh = tools::make_terrain(900'000, 1);
+    const TriangleMesh mesh = tools::make_hairball(600'000, 1);
     const auto sweeps = [&](std::optional<std::size_t> treelet_bytes, std::size_t count) {
         Scene scene = make_scene(mesh);
         BuildOptions build;
@@ -247,6 +248,8 @@ TEST_CASE("auto sweeps where the tree is beyond the cache and rays pay for fetch
     BuildOptions fast;
     fast.accel = AccelKind::kBvhMorton;
     CHECK(build_tree(mesh.view(), fast).treelets.begin.empty());
+    const TriangleMesh terrain = tools::make_terrain(900'000, 1);
+    CHECK(build_tree(terrain.view(), {}).treelets.begin.empty());
 }
 
 TEST_CASE("options out of range are refused") {

@@ -47,8 +47,8 @@ enum class TreeletCut : std::uint8_t {
 
 /// A size of treelets that serves `Mode::kTreelet` well: docs/benchmarking.md#treelets.
 inline constexpr std::size_t kUsualTreeletBytes = std::size_t{1} << 20;
-/// Trees of so many bytes are cut into treelets if nothing else is asked for: more than the last
-/// level of most caches holds.
+/// Trees of so many bytes, which is more than the last level of most caches holds, may be cut into
+/// treelets if nothing else is asked for.
 inline constexpr std::size_t kLeastBytesToCut = std::size_t{32} << 20;
 
 struct BuildOptions {
@@ -91,8 +91,8 @@ struct BuildOptions {
     /// Bytes of a treelet, at most, with its triangles (but one node is not cut). Rays enter fewer
     /// large ones, small ones stay in a nearer cache. 0 cuts none: then `Mode::kAuto` does without
     /// them, and `Mode::kTreelet` is as `Mode::kStream`. Without a value it is kUsualTreeletBytes
-    /// for trees from kLeastBytesToCut on, where cutting takes a tenth of the time of building, and
-    /// 0 for smaller ones, and for `kBvhMorton`, of whose time it would take a third.
+    /// from kLeastBytesToCut and a SAH cost of 128 on, where cutting takes a tenth of the time of
+    /// building, and 0 for other trees, and for `kBvhMorton`, of whose time it takes a third.
     std::optional<std::size_t> treelet_bytes;
     TreeletCut treelet_cut = TreeletCut::kAreas;
     /// Threads to build with, at most the CPU's; 0 takes all of them, 1 starts none. The tree is

@@ -290,7 +290,8 @@ TreeletStats count_treelets(const Tree& tree) {
 
 void cut_into_treelets(Tree& tree, AccelKind kind, const BuildOptions& options,
                        const Parallel& parallel) {
-    const bool is_usual = kind != AccelKind::kBvhMorton && tree.byte_count() >= kLeastBytesToCut;
+    const bool is_usual = kind != AccelKind::kBvhMorton && tree.byte_count() >= kLeastBytesToCut &&
+                          tree.stats.sah_cost >= kLeastCostToCut;
     const std::size_t usual = is_usual ? kUsualTreeletBytes : 0;
     const std::size_t most_bytes = options.treelet_bytes.value_or(usual);
     if (most_bytes == 0 || !tree.view().is_tree()) return;

@@ -14,6 +14,10 @@
 
 namespace packet {
 
+/// Rays through trees of a lower SAH cost meet so few nodes that streams take less time than
+/// waiting at treelets does: docs/benchmarking.md#treelets.
+inline constexpr double kLeastCostToCut = 128.0;
+
 /// Cuts the tree into treelets by `options`, and lays its wide nodes out treelet by treelet, each
 /// depth first; a treelet comes before those below it. Fills tree.treelets and the statistics.
 /// Nothing for a grid, or if `options` want none. The same for any number of threads. For areas

@@ -90,7 +90,7 @@ private:
         const TreeletJob job{batch, kernel, options_.queue_bytes / threads,
                              static_cast<std::uint32_t>(options_.queue_chunk)};
         const std::size_t length = rays_per_sweep(
-            batch.count, treelet_bytes(*scene_.view.instances[0].tree), parallel_.threads());
+            batch.count, scene_.view.instances[0].tree->byte_count, parallel_.threads());
         std::atomic<std::size_t> next{0};
         parallel_.for_pieces(threads, 1, [&](std::size_t, std::size_t) {
             TreeletSweep sweep(job);

@@ -66,7 +66,8 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
         return {KernelTable::kSorted, Sorting::kByTask};
     }
     if (has_treelets(scene.view) && rays.size() >= kLeastRaysTogether &&
-        sweeps_beat_streams(rays.size(), treelet_bytes(*scene.view.instances[0].tree), threads)) {
+        sweeps_beat_streams(rays.size(), scene.view.instances[0].tree->byte_count,
+                            scene.stats.sah_cost, threads)) {
         return plan_treelets();
     }
     if (may_stream) return plan_streams(scene, rays);

@@ -1,5 +1,6 @@
 #include "schedule/treelet_sweep.h"
 
+#include "build/treelets.h"
 #include "schedule/stream_order.h"
 #include "schedule/treelet_order.h"
 
@@ -27,12 +28,6 @@ void fetch_lines(const T* object) {
 
 }  // namespace
 
-std::size_t treelet_bytes(const TreeView& tree) noexcept {
-    std::size_t out = 0;
-    for (std::uint32_t t = 0; t < tree.treelet_count; ++t) out += tree.treelet_roots[t].bytes;
-    return out;
-}
-
 std::size_t rays_per_sweep(std::size_t rays, std::size_t tree_bytes, int threads) noexcept {
     constexpr std::size_t kBytesPerRay = 1000;  // measured: docs/benchmarking.md#treelets
     constexpr std::size_t kLeast = 65536;
@@ -44,10 +39,11 @@ std::size_t rays_per_sweep(std::size_t rays, std::size_t tree_bytes, int threads
     return std::max<std::size_t>((rays + sweeps - 1) / sweeps, 1);
 }
 
-bool sweeps_beat_streams(std::size_t rays, std::size_t tree_bytes, int threads) noexcept {
+bool sweeps_beat_streams(std::size_t rays, std::size_t tree_bytes, double sah_cost,
+                         int threads) noexcept {
     constexpr std::size_t kMostBytesPerRay = 2000;  // measured: docs/benchmarking.md#treelets
     const std::size_t together = std::min(rays, kMostSortedTogether);
-    return tree_bytes >= kLeastBytesToCut &&
+    return tree_bytes >= kLeastBytesToCut && sah_cost >= kLeastCostToCut &&
            tree_bytes <= kMostBytesPerRay * rays_per_sweep(together, tree_bytes, threads);
 }
 
