@@ -295,6 +295,36 @@ TEST_CASE("shadow rays go by tiles where these are full, by streams elsewhere, w
     }
 }
 
+TEST_CASE("tasks that are traced to try packets keep their answers") {
+    constexpr std::size_t kCount = 300'000;  // more than 512 tasks of 512 rays
+    for (const AccelKind accel : {AccelKind::kBvh, AccelKind::kGrid}) {
+        Scene scene = make_scene(tools::make_city(2000, 1));
+        BuildOptions build;
+        build.accel = accel;
+        scene.commit(build);
+        std::vector<Ray> rays = random_rays(scene.bounds(), kCount, 4);
+        // One tree: alike, so that tiles are tried beside packets. A grid: single rays are.
+        if (accel == AccelKind::kBvh) {
+            const Bounds3f box = scene.bounds();
+            for (std::size_t i = 0; i < kCount; ++i) {
+                const float part = static_cast<float>(i) / static_cast<float>(kCount);
+                rays[i] =
+                    aim(box.upper, box.lower + glm::vec3(part, 0.0f, 1.0f - part) * box.extent());
+            }
+        }
+        std::vector<Hit> want(kCount), got(kCount);
+        TraceOptions options;
+        options.mode = Mode::kSingle;
+        trace_closest(scene, rays, want, options);
+        options.mode = Mode::kAuto;
+        for (options.threads = 1; options.threads <= 2; ++options.threads) {
+            std::ranges::fill(got, Hit{});
+            trace_closest(scene, rays, got, options);
+            CHECK(got == want);
+        }
+    }
+}
+
 TEST_CASE("one committed scene may be traced from many threads at once") {
     Scene scene = make_scene(tools::make_city(5000, 1));
     scene.commit();
