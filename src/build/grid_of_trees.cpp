@@ -22,21 +22,46 @@ constexpr double kShareOfGrid = 0.3, kShareOfTrees = 0.7;
 // Trees of more references than this are built by all threads, one after the other.
 constexpr std::uint32_t kSharedTree = 65536;
 
-/// The box of the part of a triangle in a cell.
-Reference make_reference(MeshView mesh, std::uint32_t id, const Bounds3f& cell) {
-    const glm::uvec3 t = mesh.triangles[id];
+/// The triangles' references, by id.
+class ReferenceOf {
+public:
+    ReferenceOf(MeshView mesh, const ScratchVector<Reference>& references)
+        : references_(references), skipped_(mesh.triangles.size() - references.size()) {}
+
+    [[nodiscard]] const Reference& operator()(std::uint32_t id) const {
+        // They are in order, and no more are missing before one than in all.
+        const std::size_t last = std::min<std::size_t>(id, references_.size() - 1);
+        const std::size_t first = id < skipped_ ? 0 : id - skipped_;
+        const auto at = [&](std::size_t i) {
+            return references_.begin() + static_cast<std::ptrdiff_t>(i);
+        };
+        const auto has_lower_id = [](const Reference& r, std::uint32_t i) { return r.id < i; };
+        return *std::lower_bound(at(first), at(last), id, has_lower_id);
+    }
+
+private:
+    const ScratchVector<Reference>& references_;
+    std::size_t skipped_;
+};
+
+/// That of the part of a triangle in a cell.
+Reference clip_to(const Bounds3f& cell, const Reference& reference, MeshView mesh) {
+    if (cell.contains(reference.bounds())) return reference;
+    const glm::uvec3 t = mesh.triangles[reference.id];
     const glm::vec3 corners[3] = {mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z]};
-    Bounds3f box;
-    for (const glm::vec3& p : corners) box.extend(p);
-    if (!cell.contains(box)) box = clip_triangle(corners, cell);
-    return {box.lower, id, box.upper};
+    const Bounds3f box = clip_triangle(corners, cell);
+    return {box.lower, reference.id, box.upper};
 }
 
 class TreesBuilder {
 public:
-    TreesBuilder(const CellLists& cells, MeshView mesh, const BuildOptions& options,
-                 const Parallel& parallel)
-        : cells_(cells), mesh_(mesh), options_(options), parallel_(parallel) {
+    TreesBuilder(const CellLists& cells, MeshView mesh, const ScratchVector<Reference>& references,
+                 const BuildOptions& options, const Parallel& parallel)
+        : cells_(cells),
+          mesh_(mesh),
+          reference_of_(mesh, references),
+          options_(options),
+          parallel_(parallel) {
         for (std::size_t i = 0; i < cells.lists.size(); ++i) {
             if (cells.lists[i].count <= kLongestList) continue;
             crowded_.push_back(i);
@@ -76,7 +101,7 @@ private:
         const Bounds3f cell = cells_.space.box_of(cells_.space.cell_of(in.cell));
         ScratchVector<Reference> references(in.count);
         for (std::size_t i = 0; i < in.count; ++i) {
-            references[i] = make_reference(mesh_, cells_.ids[in.first + i], cell);
+            references[i] = clip_to(cell, reference_of_(cells_.ids[in.first + i]), mesh_);
         }
         return make_tree(build_bvh_sah(std::move(references), options_, parallel), mesh_, options_,
                          parallel);
@@ -113,6 +138,7 @@ private:
 
     const CellLists& cells_;
     MeshView mesh_;
+    ReferenceOf reference_of_;
     const BuildOptions& options_;  ///< of the trees
     const Parallel& parallel_;
     std::vector<std::size_t> crowded_;  ///< lists that become trees
@@ -133,7 +159,7 @@ Tree build_grid_of_trees(MeshView mesh, const ScratchVector<Reference>& referenc
                             kCellShare * static_cast<double>(options.grid_density), options, grid);
         out = make_grid(cells, kLongestList, mesh, grid);
         out.stats.sah_cost = expected_cost(cells, kLongestList, options);
-        TreesBuilder(cells, mesh, options, parallel).add_to(out);
+        TreesBuilder(cells, mesh, references, options, parallel).add_to(out);
     });
     out.stats.bytes = out.byte_count();
     return out;

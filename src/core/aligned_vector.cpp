@@ -25,20 +25,29 @@ namespace packet {
 namespace {
 
 constexpr std::size_t kCacheLine = 64;
+constexpr std::size_t kSmallPages = std::size_t{64} << 10;  // whatever the system's are
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
-/// Small arrays would waste most of a huge page.
-bool is_large(std::size_t bytes) noexcept { return bytes >= 2 * kHugePage; }
+/// Smaller arrays come and go within memory that the process has.
+bool is_large(std::size_t bytes) noexcept { return bytes >= 8 * kSmallPages; }
 
-std::size_t in_huge_pages(std::size_t bytes) noexcept {
-    return (bytes + kHugePage - 1) / kHugePage * kHugePage;
+/// The pages of a large array. A smaller one would waste most of a huge page.
+std::size_t page_of(std::size_t bytes) noexcept {
+    return bytes >= 2 * kHugePage ? kHugePage : kSmallPages;
 }
 
+std::size_t in_pages(std::size_t bytes) noexcept {
+    const std::size_t page = page_of(bytes);
+    return (bytes + page - 1) / page * page;
+}
+
+/// Of as many bytes as fill pages.
 void* allocate_large(std::size_t bytes) {
-    void* const memory = ::operator new (bytes, std::align_val_t{kHugePage});
+    const std::size_t page = page_of(bytes);
+    void* const memory = ::operator new (bytes, std::align_val_t{page});
 #if defined(__linux__)
     // Where the system grants none, pages are small: nothing else changes.
-    (void)madvise(memory, bytes, MADV_HUGEPAGE);
+    if (page == kHugePage) (void)madvise(memory, bytes, MADV_HUGEPAGE);
 #endif
     return memory;
 }
@@ -53,17 +62,20 @@ bool give_away([[maybe_unused]] void* memory, [[maybe_unused]] std::size_t bytes
 #endif
 }
 
-void free_large(void* memory) noexcept { ::operator delete (memory, std::align_val_t{kHugePage}); }
+void free_large(void* memory, std::size_t bytes) noexcept {
+    ::operator delete (memory, std::align_val_t{page_of(bytes)});
+}
 
 /// Blocks that nobody uses. The oldest make room for others.
 class SpareBlocks {
 public:
-    /// A block of at least `bytes`, and at most an eighth more; or null.
+    /// A block of at least `bytes`, and at most an eighth more, in pages as large; or null.
     [[nodiscard]] void* take(std::size_t bytes) noexcept {
         const std::scoped_lock lock(mutex_);
         Block* best = nullptr;
         for (Block& block : blocks_) {
             if (block.bytes < bytes || block.bytes > bytes + bytes / 8) continue;
+            if (page_of(block.bytes) != page_of(bytes)) continue;
             if (best == nullptr || block.bytes < best->bytes) best = &block;
         }
         return best == nullptr ? nullptr : std::exchange(*best, Block{}).memory;
@@ -71,17 +83,20 @@ public:
 
     /// Takes over a block that would else be freed, and frees those there is no more room for.
     void put(void* memory, std::size_t bytes) noexcept {
-        if (bytes > kMostBytes || !give_away(memory, bytes)) return free_large(memory);
+        if (bytes > kMostBytes || !give_away(memory, bytes)) return free_large(memory, bytes);
         const std::scoped_lock lock(mutex_);
         Block moved{memory, bytes};
         std::size_t sum = 0;
         for (Block& block : blocks_) {
             std::swap(moved, block);  // each moves on by one place, up to one that is empty
             sum += block.bytes;
-            if (sum > kMostBytes) free_large(std::exchange(block, Block{}).memory);
+            if (sum > kMostBytes) {
+                const Block oldest = std::exchange(block, Block{});
+                free_large(oldest.memory, oldest.bytes);
+            }
             if (moved.memory == nullptr) return;
         }
-        free_large(moved.memory);
+        free_large(moved.memory, moved.bytes);
     }
 
 private:
@@ -93,7 +108,7 @@ private:
     static constexpr std::size_t kMostBytes = std::size_t{512} << 20;
 
     std::mutex mutex_;
-    std::array<Block, 16> blocks_;  ///< the newest first
+    std::array<Block, 64> blocks_;  ///< the newest first
 };
 
 /// Never destroyed: vectors of static lifetime may be freed after anything else.
@@ -106,13 +121,13 @@ SpareBlocks& spare_blocks() {
 
 void* allocate_aligned(std::size_t bytes) {
     if (!is_large(bytes)) return ::operator new (bytes, std::align_val_t{kCacheLine});
-    bytes = in_huge_pages(bytes);
+    bytes = in_pages(bytes);
     void* const spare = spare_blocks().take(bytes);
     return spare != nullptr ? spare : allocate_large(bytes);
 }
 
 void deallocate_aligned(void* memory, std::size_t bytes) noexcept {
-    if (is_large(bytes)) return spare_blocks().put(memory, in_huge_pages(bytes));
+    if (is_large(bytes)) return spare_blocks().put(memory, in_pages(bytes));
     ::operator delete (memory, std::align_val_t{kCacheLine});
 }
 
