@@ -296,7 +296,7 @@ TEST_CASE("shadow rays go by tiles where these are full, by streams elsewhere, w
 }
 
 TEST_CASE("tasks that are traced to try packets keep their answers") {
-    constexpr std::size_t kCount = 300'000;  // more than 512 tasks of 512 rays
+    constexpr std::size_t kCount = 70'000;  // more than 128 tasks of 512 rays
     for (const AccelKind accel : {AccelKind::kBvh, AccelKind::kGrid}) {
         Scene scene = make_scene(tools::make_city(2000, 1));
         BuildOptions build;

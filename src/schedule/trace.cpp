@@ -19,8 +19,9 @@ namespace packet {
 
 namespace {
 
-// Packets are tried if that is so little of the whole that the slower tries do not count.
-constexpr std::size_t kLeastTasksForTrial = 512;
+// Packets are tried if that is so little of the whole that the slower tries do not count: mostly
+// two tasks, for then tiles that are faster have won.
+constexpr std::size_t kLeastTasksForTrial = 128;
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
@@ -111,17 +112,21 @@ private:
     /// Pairs of neighbouring tasks, spread over all: each contender gets one of a pair.
     [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrialPairs; }
     [[nodiscard]] bool is_trial(std::size_t task) const {
-        return tries_ && task % trial_stride() < 2 && task / trial_stride() < kTrialPairs;
+        return tries_ && task % trial_stride() < 2 && task / trial_stride() < pairs_tried_;
     }
 
-    /// Traces the trial tasks and returns what was faster in most pairs: a vote, since one task
-    /// that the system interrupts must not decide. Their hits are as good as any.
+    /// Traces pairs of tasks until enough have told what is faster: a vote, since one task that the
+    /// system interrupts must not decide. Their hits are as good as any.
     template <class KernelOf>
-    [[nodiscard]] KernelTable::Kernel try_packets(const KernelOf& kernel,
-                                                  const TraceBatch& batch) const {
+    [[nodiscard]] KernelTable::Kernel try_packets(const KernelOf& kernel, const TraceBatch& batch) {
         const KernelTable::Kernel planned = plan_.kernel;
         std::size_t won_by_packets = 0;
-        for (std::size_t pair = 0; pair < kTrialPairs; ++pair) {
+        const auto is_open = [&] {
+            const std::size_t left = kTrialPairs - pairs_tried_;
+            return won_by_packets < plan_.least_wins && won_by_packets + left >= plan_.least_wins;
+        };
+        for (; is_open(); ++pairs_tried_) {
+            const std::size_t pair = pairs_tried_;
             const auto time = [&](std::size_t member, KernelTable::Kernel which) {
                 const auto start = std::chrono::steady_clock::now();
                 run_task(pair * trial_stride() + member, kernel(which), batch);
@@ -156,7 +161,8 @@ private:
     Parallel parallel_;
     TracePlan plan_;
     RayTasks tasks_;
-    bool tries_;  ///< whether to find the kernel by trying
+    bool tries_;                   ///< whether to find the kernel by trying
+    std::size_t pairs_tried_ = 0;  ///< of neighbouring tasks
     mutable std::mutex stats_mutex_;
 };
 
