@@ -50,8 +50,8 @@ std::size_t reference_count(const Tree& tree) {
 
 bool are_same(const Tree& a, const Tree& b) {
     const auto same = [](const auto& x, const auto& y) {
-        return x.size() == y.size() &&
-               std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])) == 0;
+        if (x.size() != y.size()) return false;
+        return x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])) == 0;
     };
     return same(a.nodes, b.nodes) && same(a.wide_nodes, b.wide_nodes) && same(a.blocks, b.blocks);
 }
