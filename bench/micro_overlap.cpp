@@ -1,5 +1,5 @@
 // Triangle-box overlap as a grid's builder asks for it: triangles a few cells large, each against
-// runs of eight cells that its own box meets.
+// runs of 32 cells of which its own box meets most.
 #include "micro.h"
 
 #include "build/overlap.h"
@@ -19,12 +19,12 @@
 namespace packet::bench {
 namespace {
 
-constexpr int kLanes = 8;
-constexpr std::size_t kRunCount = 4096;  // a megabyte, which stays in the cache
+constexpr int kBoxes = 32;
+constexpr std::size_t kRunCount = 1024;  // a megabyte, which stays in the cache
 
-/// A triangle and eight cells in a row.
+/// A triangle and four rows of eight cells.
 struct Run {
-    float v[3][3], lower[3][kLanes], upper[3][kLanes];
+    float v[3][3], lower[3][kBoxes], upper[3][kBoxes];
 
     [[nodiscard]] glm::vec3 corner(int k) const { return {v[k][0], v[k][1], v[k][2]}; }
     [[nodiscard]] Bounds3f box(int i) const {
@@ -47,7 +47,7 @@ Run make_run(tools::Random& random) {
         glm::floor(glm::vec3{box.lower.x, random.uniform(box.lower.y, box.upper.y),
                              random.uniform(box.lower.z, box.upper.z)});
     for (int a = 0; a < 3; ++a) {
-        for (int i = 0; i < kLanes; ++i) {
+        for (int i = 0; i < kBoxes; ++i) {
             out.lower[a][i] = first[a] + (a == 0 ? static_cast<float>(i) : 0.0f);
             out.upper[a][i] = out.lower[a][i] + 1.0f;
         }
@@ -72,25 +72,25 @@ void measure(benchmark::State& state, const Runs& runs, Ask ask) {
         for (const Run& run : runs) overlaps += ask(run);
         benchmark::DoNotOptimize(overlaps);
     }
-    const double boxes = static_cast<double>(runs.size()) * kLanes;
+    const double boxes = static_cast<double>(runs.size()) * kBoxes;
     state.counters["boxes/s"] = benchmark::Counter(boxes * static_cast<double>(state.iterations()),
                                                    benchmark::Counter::kIsRate);
     state.counters["overlapping"] = static_cast<double>(overlaps) / boxes;
 }
 
-void add_wide(const char* test, KernelTable::Overlap8 KernelTable::*kernel,
+void add_wide(const char* test, KernelTable::Overlap KernelTable::*kernel,
               const std::shared_ptr<const Runs>& runs) {
     for (const IsaId isa : built_isas()) {
         const auto body = [runs, kernel, isa](benchmark::State& state) {
             if (!cpu_supports(isa)) {
                 return state.SkipWithError("this CPU lacks the instruction set");
             }
-            const KernelTable::Overlap8 overlap = select_kernels(isa).*kernel;
+            const KernelTable::Overlap overlap = select_kernels(isa).*kernel;
             measure(state, *runs, [overlap](const Run& run) {
-                return __builtin_popcount(overlap(run.v, run.lower, run.upper));
+                return __builtin_popcount(overlap(run.v, run.lower, run.upper, kBoxes));
             });
         };
-        const std::string name = fmt::format("overlap/{}/{}/{}", test, kLanes, to_string(isa));
+        const std::string name = fmt::format("overlap/{}/{}/{}", test, kBoxes, to_string(isa));
         benchmark::RegisterBenchmark(name.c_str(), body);
     }
 }
@@ -101,7 +101,7 @@ void add_single(const char* test, const std::shared_ptr<const Runs>& runs, Overl
         measure(state, *runs, [&](const Run& run) {
             const glm::vec3 v[3] = {run.corner(0), run.corner(1), run.corner(2)};
             int found = 0;
-            for (int i = 0; i < kLanes; ++i) found += overlaps(v, run.box(i)) ? 1 : 0;
+            for (int i = 0; i < kBoxes; ++i) found += overlaps(v, run.box(i)) ? 1 : 0;
             return found;
         });
     };
@@ -113,9 +113,9 @@ void add_single(const char* test, const std::shared_ptr<const Runs>& runs, Overl
 void add_overlap_benchmarks() {
     const std::shared_ptr<const Runs> runs = make_runs();
     add_single("axes", runs, overlaps_by_axes);
-    add_wide("axes", &KernelTable::overlap_axes8, runs);
+    add_wide("axes", &KernelTable::overlap_axes, runs);
     add_single("clip", runs, overlaps_by_clipping);
-    add_wide("clip", &KernelTable::overlap_clip8, runs);
+    add_wide("clip", &KernelTable::overlap_clip, runs);
 }
 
 }  // namespace packet::bench

@@ -22,9 +22,10 @@ using namespace packet::test;
 
 namespace {
 
-/// What the kernels get.
+/// What the kernels get. All but one test use the first kBoxes.
 struct FloatCase {
-    float v[3][3], lower[3][kBoxes], upper[3][kBoxes];
+    static constexpr int kMost = 32;
+    float v[3][3], lower[3][kMost], upper[3][kMost];
 
     [[nodiscard]] std::string describe(int box) const {
         std::string out;
@@ -65,18 +66,18 @@ struct Answers {
     std::uint32_t axes, clip;
 };
 
-Answers ask(const KernelTable& kernels, const FloatCase& in) {
-    return {kernels.overlap_axes8(in.v, in.lower, in.upper),
-            kernels.overlap_clip8(in.v, in.lower, in.upper)};
+Answers ask(const KernelTable& kernels, const FloatCase& in, int count = kBoxes) {
+    return {kernels.overlap_axes(in.v, in.lower, in.upper, count),
+            kernels.overlap_clip(in.v, in.lower, in.upper, count)};
 }
 
 /// The same, box by box.
-Answers ask_one_by_one(const FloatCase& in) {
+Answers ask_one_by_one(const FloatCase& in, int count = kBoxes) {
     const glm::vec3 v[3] = {{in.v[0][0], in.v[0][1], in.v[0][2]},
                             {in.v[1][0], in.v[1][1], in.v[1][2]},
                             {in.v[2][0], in.v[2][1], in.v[2][2]}};
     Answers out = {0, 0};
-    for (int i = 0; i < kBoxes; ++i) {
+    for (int i = 0; i < count; ++i) {
         const Bounds3f box{{in.lower[0][i], in.lower[1][i], in.lower[2][i]},
                            {in.upper[0][i], in.upper[1][i], in.upper[2][i]}};
         out.axes |= (overlaps_by_axes(v, box) ? 1u : 0u) << i;
@@ -164,7 +165,7 @@ FloatCase any_floats(tools::Random& random) {
         for (float& x : corner) x = number();
     }
     for (int a = 0; a < 3; ++a) {
-        for (int i = 0; i < kBoxes; ++i) {
+        for (int i = 0; i < FloatCase::kMost; ++i) {
             // Planes through corners, and boxes that reach far, so that not all are apart.
             const float from = random.next() % 4 == 0 ? out.v[random.next() % 3][a] : number();
             const float to = random.next() % 2 == 0 ? out.v[random.next() % 3][a] : number();
@@ -270,6 +271,23 @@ TEST_CASE("a triangle that is not finite overlaps nothing [baseline]") {
                 check_answers(in, 0);
                 for (int i = 0; i < kBoxes; ++i) in.lower[a][i] = -INFINITY, in.upper[a][i] = bad;
                 check_answers(in, 0);
+            }
+        }
+    }
+}
+
+TEST_CASE("the first boxes of many are tested as each alone [baseline]") {
+    tools::Random random(7);
+    for (int round = 0; round < 200; ++round) {
+        const FloatCase in = any_floats(random);
+        const Answers expected = ask_one_by_one(in, FloatCase::kMost);
+        for (const IsaId isa : built_isas()) {
+            if (!cpu_supports(isa)) continue;
+            for (int count = 1; count <= FloatCase::kMost; ++count) {
+                const std::uint32_t first = 0xffffffffu >> (FloatCase::kMost - count);
+                const Answers answers = ask(select_kernels(isa), in, count);
+                CHECK(answers.axes == (expected.axes & first));
+                CHECK(answers.clip == (expected.clip & first));
             }
         }
     }

@@ -66,8 +66,7 @@ std::vector<Piece> place_pieces(const CellLists& cells, std::uint32_t longest,
 
 void lay_out(const CellLists& cells, std::uint32_t longest, const Piece& piece, MeshView mesh,
              Tree& out) {
-    const auto first = out.blocks.begin() + static_cast<std::ptrdiff_t>(piece.first_block);
-    std::fill_n(first, piece.block_count, make_empty_block());
+    const TriangleBlock empty = make_empty_block();
     std::size_t used = piece.first_block * kBlockSize;
     for (std::size_t i = piece.begin; i < piece.end; ++i) {
         const CellList& list = cells.lists[i];
@@ -75,8 +74,9 @@ void lay_out(const CellLists& cells, std::uint32_t longest, const Piece& piece, 
         used = place_list(used, list.count);
         out.grid.cells[i] = {static_cast<std::uint32_t>(used), list.count};
         for (std::uint32_t k = 0; k < list.count; ++k, ++used) {
-            put_triangle(out.blocks[used / kBlockSize], used % kBlockSize, mesh,
-                         cells.ids[list.first + k]);
+            TriangleBlock& block = out.blocks[used / kBlockSize];
+            if (used % kBlockSize == 0) block = empty;
+            put_triangle(block, used % kBlockSize, mesh, cells.ids[list.first + k]);
         }
     }
 }

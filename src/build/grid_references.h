@@ -27,8 +27,8 @@ struct CellLists {
 /// references within options.max_reference_factor times the triangles, and sorts them into the
 /// cells. A triangle is referred to by each cell that it overlaps, by an exact test, of those that
 /// its box reaches into (GridSpace::range_of): each of its points lies in such a cell.
-/// O(n + references), 48 bytes of scratch a reference, parallel; the result does not depend on the
-/// number of threads.
+/// O(n + references), 12 bytes of scratch a reference and 24 a list, parallel; the result does not
+/// depend on the number of threads.
 [[nodiscard]] CellLists sort_into_cells(MeshView mesh, const ScratchVector<Reference>& references,
                                         double cells_per_triangle, const BuildOptions& options,
                                         const Parallel& parallel);

@@ -96,7 +96,7 @@ private:
     /// Where the triangle overlaps the box's part; other octants' bits are of no use.
     [[nodiscard]] unsigned overlapped_octants(const glm::vec3 (&corners)[3], const Bounds3f& box,
                                               const glm::vec3& middle) const {
-        float triangle[3][3], lower[3][kOctants], upper[3][kOctants];
+        float triangle[3][3], lower[3][32], upper[3][32];
         for (int a = 0; a < 3; ++a) {
             for (int k = 0; k < 3; ++k) triangle[k][a] = corners[k][a];
             for (std::size_t i = 0; i < kOctants; ++i) {
@@ -105,7 +105,7 @@ private:
                 upper[a][i] = part.upper[a];
             }
         }
-        return kernels_.overlap_axes8(triangle, lower, upper);
+        return kernels_.overlap_axes(triangle, lower, upper, kOctants);
     }
 
     MeshView mesh_;

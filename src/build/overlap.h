@@ -1,4 +1,4 @@
-// The triangle-box overlap tests for one box at a time. Builders that test eight at once take them
+// The triangle-box overlap tests for one box at a time. Builders that test several at once take them
 // from the KernelTable; the answers are the same.
 #pragma once
 
@@ -26,14 +26,14 @@ struct TriangleAndBox {
 /// triangle that is not finite and a box that is empty or has a NaN overlap nothing.
 [[nodiscard]] inline bool overlaps_by_axes(const glm::vec3 (&v)[3], const Bounds3f& box) noexcept {
     const TriangleAndBox in(v, box);
-    return overlap_axes<1, isa::Scalar>(in.triangle, in.lower, in.upper) != 0;
+    return overlap_axes<1, isa::Scalar>(in.triangle, in.lower, in.upper, 1) != 0;
 }
 
 /// The same answer, by clipping.
 [[nodiscard]] inline bool overlaps_by_clipping(const glm::vec3 (&v)[3],
                                                const Bounds3f& box) noexcept {
     const TriangleAndBox in(v, box);
-    return overlap_clip<1, isa::Scalar>(in.triangle, in.lower, in.upper) != 0;
+    return overlap_clip<1, isa::Scalar>(in.triangle, in.lower, in.upper, 1) != 0;
 }
 
 }  // namespace packet

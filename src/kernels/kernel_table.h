@@ -72,8 +72,10 @@ struct KernelTable {
     using Any = std::uint32_t (*)(const SceneView&, const RayPacket<N>&,
                                   std::uint32_t active) noexcept;
 
-    using Overlap8 = std::uint32_t (*)(const float (&triangle)[3][3], const float (&lower)[3][8],
-                                       const float (&upper)[3][8]) noexcept;
+    /// Which of the first `count` boxes, 1 to 32, overlap the triangle: bit i for box i. The sides
+    /// of all boxes up to the next multiple of 8 are read.
+    using Overlap = std::uint32_t (*)(const float (&triangle)[3][3], const float (&lower)[3][32],
+                                      const float (&upper)[3][32], int count) noexcept;
 
     /// kSorted: as kStream; any-hit rays go by tiles where these are full.
     enum Kernel { kSingle, kPacket8, kPacket16, kTile, kStream, kSorted, kKernelCount };
@@ -87,8 +89,8 @@ struct KernelTable {
     Closest<16> closest16;
     Any<8> any8;
     Any<16> any16;
-    Overlap8 overlap_axes8;  ///< by separating axes: which of 8 boxes overlap, bit i for box i
-    Overlap8 overlap_clip8;  ///< by clipping; the same answer
+    Overlap overlap_axes;  ///< by separating axes
+    Overlap overlap_clip;  ///< by clipping; the same answer
 };
 
 const KernelTable& kernel_table_scalar() noexcept;

@@ -39,8 +39,8 @@ constexpr KernelTable make_kernel_table() {
     table.closest16 = closest_packet<16, Isa>;
     table.any8 = any_packet<8, Isa>;
     table.any16 = any_packet<16, Isa>;
-    table.overlap_axes8 = overlap_axes<8, Isa>;
-    table.overlap_clip8 = overlap_clip<8, Isa>;
+    table.overlap_axes = overlap_axes<8, Isa, 32>;
+    table.overlap_clip = overlap_clip<8, Isa, 32>;
     return table;
 }
 

@@ -87,16 +87,17 @@ PACKET_INLINE OverlapTriangle prepare_triangle(const float (&v)[3][3]) {
     return out;
 }
 
-template <int N, class Isa>
+/// N of the boxes, from `first` on.
+template <int N, class Isa, int kMost>
 PACKET_INLINE ClampedBoxes<N, Isa> clamp_boxes(const OverlapTriangle& triangle,
-                                               const float (&lower)[3][N],
-                                               const float (&upper)[3][N]) {
+                                               const float (&lower)[3][kMost],
+                                               const float (&upper)[3][kMost], int first) {
     using F = Float<N, Isa>;
     ClampedBoxes<N, Isa> out;
     for (int a = 0; a < 3; ++a) {
         // min and max yield their second operand for NaN: a NaN stays one and the box is empty
-        out.lower[a] = max(F(triangle.lower[a]), F::load(lower[a]));
-        out.upper[a] = min(F(triangle.upper[a]), F::load(upper[a]));
+        out.lower[a] = max(F(triangle.lower[a]), F::load(lower[a] + first));
+        out.upper[a] = min(F(triangle.upper[a]), F::load(upper[a] + first));
         const Mask<N, Isa> meet = out.lower[a] <= out.upper[a];
         out.meet = a == 0 ? meet : out.meet & meet;
     }
@@ -221,22 +222,30 @@ struct FilteredOverlaps {
     std::uint32_t overlap, undecided;
 };
 
-/// The frame of both tests. `filter(prepared, boxes)` sorts boxes into those that overlap for sure
-/// and those that may; the latter are decided exactly. No box overlaps a triangle that is not
-/// finite, and nothing overlaps a box with a NaN or with lower > upper.
-template <int N, class Isa, class Filter>
-PACKET_INLINE std::uint32_t find_overlaps(const float (&triangle)[3][3], const float (&lower)[3][N],
-                                          const float (&upper)[3][N], Filter filter) {
+/// The frame of both tests, of the first `count` boxes. `filter(prepared, boxes)` sorts N boxes into
+/// those that overlap for sure and those that may; the latter are decided exactly. No box overlaps a
+/// triangle that is not finite, and nothing overlaps a box with a NaN or with lower > upper.
+template <int N, class Isa, int kMost, class Filter>
+PACKET_INLINE std::uint32_t find_overlaps(const float (&triangle)[3][3],
+                                          const float (&lower)[3][kMost],
+                                          const float (&upper)[3][kMost], int count,
+                                          Filter filter) {
+    static_assert(kMost % N == 0 && kMost <= 32);
     const OverlapTriangle prepared = prepare_triangle(triangle);
-    const ClampedBoxes<N, Isa> boxes = clamp_boxes<N, Isa>(prepared, lower, upper);
-    const std::uint32_t meet = boxes.meet.bits();
-    if (meet == 0 || !prepared.is_finite) return 0;
-    FilteredOverlaps<N, Isa> found = {0, meet};
-    if (prepared.is_tame) [[likely]]
-        found = filter(prepared, boxes);
-    if (found.undecided != 0) [[unlikely]]
-        found.overlap |= decide_overlaps(triangle, boxes, found.undecided);
-    return found.overlap;
+    if (!prepared.is_finite) return 0;
+    std::uint32_t overlap = 0;
+    for (int first = 0; first < count; first += N) {
+        const ClampedBoxes<N, Isa> boxes = clamp_boxes<N, Isa>(prepared, lower, upper, first);
+        const std::uint32_t meet = boxes.meet.bits();
+        if (meet == 0) continue;
+        FilteredOverlaps<N, Isa> found = {0, meet};
+        if (prepared.is_tame) [[likely]]
+            found = filter(prepared, boxes);
+        if (found.undecided != 0) [[unlikely]]
+            found.overlap |= decide_overlaps(triangle, boxes, found.undecided);
+        overlap |= found.overlap << first;
+    }
+    return overlap & (0xffffffffu >> (32 - count));
 }
 
 }  // namespace packet

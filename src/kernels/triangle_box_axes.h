@@ -73,12 +73,12 @@ PACKET_INLINE FilteredOverlaps<N, Isa> filter_by_axes(const OverlapTriangle& tri
     return {(~verdict.near).bits(), (verdict.near & ~verdict.apart).bits()};
 }
 
-/// Which of the boxes overlap the triangle. Bit i is box i.
-template <int N, class Isa>
-std::uint32_t overlap_axes(const float (&triangle)[3][3], const float (&lower)[3][N],
-                           const float (&upper)[3][N]) noexcept {
+/// Which of the first `count` boxes, 1 to kMost, overlap the triangle. Bit i is box i.
+template <int N, class Isa, int kMost>
+std::uint32_t overlap_axes(const float (&triangle)[3][3], const float (&lower)[3][kMost],
+                           const float (&upper)[3][kMost], int count) noexcept {
     return find_overlaps<N, Isa>(
-        triangle, lower, upper,
+        triangle, lower, upper, count,
         [&](const OverlapTriangle& prepared, const ClampedBoxes<N, Isa>& boxes) {
             return filter_by_axes(prepared, triangle[0], boxes);
         });
