@@ -19,9 +19,15 @@ namespace packet {
 
 namespace {
 
-// Packets are tried if that is so little of the whole that the slower tries do not count: mostly
-// two tasks, for then tiles that are faster have won.
-constexpr std::size_t kLeastTasksForTrial = 128;
+// Packets are tried if that is so little of the whole that the slower tasks do not count: those of
+// two tries if packets take so much longer in both.
+constexpr std::size_t kLeastTasksForTries = 128;
+constexpr std::size_t kTries = 9;
+constexpr double kHopeless = 1.25;
+// Tries are spread over all tasks, and so are the first few: parts of an image differ.
+constexpr std::size_t place_of_try(std::size_t i) { return (5 * i + 4) % kTries; }
+constexpr std::size_t try_at(std::size_t place) { return (2 * place + 1) % kTries; }
+static_assert(kTries == 9);  // so that each is the other's inverse
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
@@ -37,7 +43,7 @@ public:
           plan_(make_plan(scene_, rays, query, options.mode, parallel_.threads())),
           tasks_(plan_.sorting != Sorting::kNone ? RayTasks::sorted(rays, parallel_.threads())
                                                  : RayTasks(rays, options.width)),
-          tries_(plan_.least_wins != 0 && tasks_.count() >= kLeastTasksForTrial) {
+          tries_(plan_.packets_below != 0.0 && tasks_.count() >= kLeastTasksForTries) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
                                                   "; it must be 0 (no image) or more");
@@ -76,7 +82,7 @@ public:
             if (plan_.sorting == Sorting::kTogether) tasks_.sort_together(parallel_);
             const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : plan_.kernel;
             parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
-                if (!is_trial(task)) run_task(task, kernel(best), batch);
+                if (!is_tried(task)) run_task(task, kernel(best), batch);
                 parallel_.advance(1.0 / static_cast<double>(tasks_.count()));
             });
         });
@@ -109,39 +115,64 @@ private:
         *options_.stats += stats;
     }
 
-    /// Pairs of neighbouring tasks, spread over all: each contender gets one of a pair.
-    [[nodiscard]] std::size_t trial_stride() const { return tasks_.count() / kTrialPairs; }
-    [[nodiscard]] bool is_trial(std::size_t task) const {
-        return tries_ && task % trial_stride() < 2 && task / trial_stride() < pairs_tried_;
+    /// How long a task took each way.
+    struct Try {
+        double planned = 0.0, packets = 0.0;
+        [[nodiscard]] bool packets_have_hope() const { return packets < kHopeless * planned; }
+    };
+    /// The time that packets take, in units of the planned kernel's. Without the two tries that
+    /// speak most for either, for the system may have interrupted them.
+    [[nodiscard]] static double compare(Try (&tries)[kTries]) {
+        const auto advantage = [](const Try& t) { return t.planned - t.packets; };
+        std::ranges::sort(tries, {}, advantage);
+        Try sum{};
+        for (std::size_t i = 1; i + 1 < kTries; ++i) {
+            sum.planned += tries[i].planned;
+            sum.packets += tries[i].packets;
+        }
+        return sum.packets / sum.planned;
     }
 
-    /// Traces pairs of tasks until enough have told what is faster: a vote, since one task that the
-    /// system interrupts must not decide. Their hits are as good as any.
+    /// A try takes some neighbouring tasks.
+    static constexpr std::size_t kTasksOfTry = 4;
+    [[nodiscard]] std::size_t stride_of_tries() const { return tasks_.count() / kTries; }
+    [[nodiscard]] bool is_tried(std::size_t task) const {
+        if (!tries_) return false;
+        const std::size_t place = task / stride_of_tries();
+        return place < kTries && task % stride_of_tries() < kTasksOfTry &&
+               try_at(place) < tries_made_;
+    }
+
+    /// Traces a few tasks by the planned kernel and by packets, until packets have no hope or all
+    /// tries are made, and returns what is faster. Their hits are as good as any.
     template <class KernelOf>
     [[nodiscard]] KernelTable::Kernel try_packets(const KernelOf& kernel, const TraceBatch& batch) {
-        const KernelTable::Kernel planned = plan_.kernel;
-        std::size_t won_by_packets = 0;
-        const auto is_open = [&] {
-            const std::size_t left = kTrialPairs - pairs_tried_;
-            return won_by_packets < plan_.least_wins && won_by_packets + left >= plan_.least_wins;
-        };
-        for (; is_open(); ++pairs_tried_) {
-            const std::size_t pair = pairs_tried_;
-            const auto time = [&](std::size_t member, KernelTable::Kernel which) {
-                const auto start = std::chrono::steady_clock::now();
-                run_task(pair * trial_stride() + member, kernel(which), batch);
-                return std::chrono::steady_clock::now() - start;
-            };
-            // Who comes first finds the scene out of the cache: they take turns.
-            if (pair % 2 == 0) {
-                const auto packets = time(0, KernelTable::kPacket16);
-                won_by_packets += packets < time(1, planned);
-            } else {
-                const auto other = time(0, planned);
-                won_by_packets += time(1, KernelTable::kPacket16) < other;
-            }
+        Try tries[kTries];
+        for (bool is_open = true; is_open && tries_made_ < kTries; ++tries_made_) {
+            tries[tries_made_] = try_both(kernel, batch);
+            is_open = tries_made_ == 0 || tries[tries_made_].packets_have_hope() ||
+                      tries[tries_made_ - 1].packets_have_hope();
         }
-        return won_by_packets >= plan_.least_wins ? KernelTable::kPacket16 : planned;
+        if (tries_made_ < kTries) return plan_.kernel;
+        return compare(tries) < plan_.packets_below ? KernelTable::kPacket16 : plan_.kernel;
+    }
+
+    template <class KernelOf>
+    [[nodiscard]] Try try_both(const KernelOf& kernel, const TraceBatch& batch) const {
+        std::size_t task = place_of_try(tries_made_) * stride_of_tries();
+        // Of two tasks the first finds the rays' part of the scene, the kernel's code and its
+        // branches out of the caches, and does not count.
+        const auto second_of_two = [&](KernelTable::Kernel which) {
+            run_task(task++, kernel(which), batch);
+            const auto start = std::chrono::steady_clock::now();
+            run_task(task++, kernel(which), batch);
+            return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        };
+        Try out;
+        if (tries_made_ % 2 == 0) out.planned = second_of_two(plan_.kernel);
+        out.packets = second_of_two(KernelTable::kPacket16);
+        if (tries_made_ % 2 != 0) out.planned = second_of_two(plan_.kernel);
+        return out;
     }
 
     void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
@@ -161,8 +192,8 @@ private:
     Parallel parallel_;
     TracePlan plan_;
     RayTasks tasks_;
-    bool tries_;                   ///< whether to find the kernel by trying
-    std::size_t pairs_tried_ = 0;  ///< of neighbouring tasks
+    bool tries_;  ///< whether to find the kernel by trying
+    std::size_t tries_made_ = 0;
     mutable std::mutex stats_mutex_;
 };
 

@@ -59,9 +59,7 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
     const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
     if (is_coherent) {
         if (!may_stream || query == TraceQuery::kClosest) {
-            // Neighbouring tasks of an image differ by more than tiles and packets mostly do.
-            constexpr std::size_t kNearlyAll = kTrialPairs - 1;
-            return {.kernel = KernelTable::kTile, .least_wins = kNearlyAll};
+            return {.kernel = KernelTable::kTile, .packets_below = 0.95};
         }
         return {KernelTable::kSorted, Sorting::kByTask};
     }
@@ -71,7 +69,7 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
         return plan_treelets();
     }
     if (may_stream) return plan_streams(scene, rays);
-    return {.kernel = KernelTable::kSingle, .least_wins = kTrialPairs / 2 + 1};
+    return {.kernel = KernelTable::kSingle, .packets_below = 1.0};
 }
 
 }  // namespace

@@ -19,14 +19,13 @@ enum class Sorting {
     kTogether  ///< by millions: where neighbours are scattered, those that belong together are far
 };
 
-/// How often packets of 16 are tried beside the planned kernel, if at all.
-inline constexpr std::size_t kTrialPairs = 9;
-
 struct TracePlan {
     KernelTable::Kernel kernel;
     Sorting sorting = Sorting::kNone;
-    std::size_t least_wins = 0;  ///< of kTrialPairs, for packets of 16 to be taken; 0: no trial
-    bool by_treelets = false;    ///< by kernels of their own
+    /// Packets of 16 are tried beside the kernel, and taken if they take less than this share of
+    /// its time; 0: they are not.
+    double packets_below = 0.0;
+    bool by_treelets = false;  ///< by kernels of their own
 };
 
 /// `Mode::kAuto` looks at a sample of the rays: docs/benchmarking.md#beside-embree. O(1).
