@@ -32,8 +32,8 @@ struct Run {
     }
 };
 
-/// A triangle about eight cells wide, in any direction, and the cells from its lower x on in one of
-/// the rows that its box meets. Cells have side 1.
+/// A triangle about eight cells wide, in any direction, and eight cells from its box's lower x on
+/// in each of four rows, from one that the box meets on. Cells have side 1.
 Run make_run(tools::Random& random) {
     Run out;
     const glm::vec3 center = 100.0f * random.point();
@@ -44,11 +44,12 @@ Run make_run(tools::Random& random) {
         for (int a = 0; a < 3; ++a) corner[a] = p[a];
     }
     const glm::vec3 first =
-        glm::floor(glm::vec3{box.lower.x, random.uniform(box.lower.y, box.upper.y),
+        glm::floor(glm::vec3{box.lower.x, random.uniform(box.lower.y, box.upper.y - 3.0f),
                              random.uniform(box.lower.z, box.upper.z)});
     for (int a = 0; a < 3; ++a) {
         for (int i = 0; i < kBoxes; ++i) {
-            out.lower[a][i] = first[a] + (a == 0 ? static_cast<float>(i) : 0.0f);
+            const int place[3] = {i % 8, i / 8, 0};
+            out.lower[a][i] = first[a] + static_cast<float>(place[a]);
             out.upper[a][i] = out.lower[a][i] + 1.0f;
         }
     }
