@@ -1,6 +1,7 @@
 // Calls of the public interface: what they ask for is planned, and spread over threads.
 #include "dispatch/dispatch.h"
 #include "scene/scene_accel.h"
+#include "schedule/packet_tries.h"
 #include "schedule/parallel.h"
 #include "schedule/ray_tasks.h"
 #include "schedule/trace_plan.h"
@@ -19,15 +20,11 @@ namespace packet {
 
 namespace {
 
-// Packets are tried if that is so little of the whole that the slower tasks do not count: those of
-// two tries if packets take so much longer in both.
+// Packets are tried if that is so little of the whole that the slower tasks do not count: mostly
+// those of two tries.
 constexpr std::size_t kLeastTasksForTries = 128;
-constexpr std::size_t kTries = 9;
-constexpr double kHopeless = 1.25;
-// Tries are spread over all tasks, and so are the first few: parts of an image differ.
-constexpr std::size_t place_of_try(std::size_t i) { return (5 * i + 4) % kTries; }
-constexpr std::size_t try_at(std::size_t place) { return (2 * place + 1) % kTries; }
-static_assert(kTries == 9);  // so that each is the other's inverse
+// A try takes some neighbouring tasks.
+constexpr std::size_t kTasksOfTry = 4;
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
@@ -80,9 +77,13 @@ public:
         const auto kernel = [&](KernelTable::Kernel which) { return kernels[which][counting]; };
         parallel_.run([&] {
             if (plan_.sorting == Sorting::kTogether) tasks_.sort_together(parallel_);
-            const KernelTable::Kernel best = tries_ ? try_packets(kernel, batch) : plan_.kernel;
-            parallel_.for_pieces(tasks_.count(), 1, [&](std::size_t task, std::size_t) {
-                if (!is_tried(task)) run_task(task, kernel(best), batch);
+            PacketTries tries(plan_.kernel, plan_.packets_below);
+            const std::size_t try_count = tries_ ? PacketTries::kCount : 0;
+            // Tries come first, but nobody waits for them.
+            parallel_.for_pieces(try_count + tasks_.count(), 1, [&](std::size_t i, std::size_t) {
+                if (i < try_count) return make_try(i, kernel, batch, tries);
+                const std::size_t task = i - try_count;
+                if (!is_of_try(task)) run_task(task, kernel(tries.best()), batch);
                 parallel_.advance(1.0 / static_cast<double>(tasks_.count()));
             });
         });
@@ -115,51 +116,28 @@ private:
         *options_.stats += stats;
     }
 
-    /// How long a task took each way.
-    struct Try {
-        double planned = 0.0, packets = 0.0;
-        [[nodiscard]] bool packets_have_hope() const { return packets < kHopeless * planned; }
-    };
-    /// The time that packets take, in units of the planned kernel's. Without the two tries that
-    /// speak most for either, for the system may have interrupted them.
-    [[nodiscard]] static double compare(Try (&tries)[kTries]) {
-        const auto advantage = [](const Try& t) { return t.planned - t.packets; };
-        std::ranges::sort(tries, {}, advantage);
-        Try sum{};
-        for (std::size_t i = 1; i + 1 < kTries; ++i) {
-            sum.planned += tries[i].planned;
-            sum.packets += tries[i].packets;
-        }
-        return sum.packets / sum.planned;
+    /// Tries are spread over all tasks.
+    [[nodiscard]] std::size_t stride_of_tries() const {
+        return tasks_.count() / PacketTries::kCount;
+    }
+    [[nodiscard]] bool is_of_try(std::size_t task) const {
+        return tries_ && task % stride_of_tries() < kTasksOfTry &&
+               task / stride_of_tries() < PacketTries::kCount;
     }
 
-    /// A try takes some neighbouring tasks.
-    static constexpr std::size_t kTasksOfTry = 4;
-    [[nodiscard]] std::size_t stride_of_tries() const { return tasks_.count() / kTries; }
-    [[nodiscard]] bool is_tried(std::size_t task) const {
-        if (!tries_) return false;
-        const std::size_t place = task / stride_of_tries();
-        return place < kTries && task % stride_of_tries() < kTasksOfTry &&
-               try_at(place) < tries_made_;
-    }
-
-    /// Traces a few tasks by the planned kernel and by packets, until packets have no hope or all
-    /// tries are made, and returns what is faster. Their hits are as good as any.
+    /// Traces the tasks of a try: two by the planned kernel and two by packets, if it is not known
+    /// yet what is faster. Their hits are as good as any.
     template <class KernelOf>
-    [[nodiscard]] KernelTable::Kernel try_packets(const KernelOf& kernel, const TraceBatch& batch) {
-        Try tries[kTries];
-        for (bool is_open = true; is_open && tries_made_ < kTries; ++tries_made_) {
-            tries[tries_made_] = try_both(kernel, batch);
-            is_open = tries_made_ == 0 || tries[tries_made_].packets_have_hope() ||
-                      tries[tries_made_ - 1].packets_have_hope();
+    void make_try(std::size_t i, const KernelOf& kernel, const TraceBatch& batch,
+                  PacketTries& tries) const {
+        // The first few are spread over all, too: parts of an image differ.
+        const std::size_t place = (5 * i + 4) % PacketTries::kCount;
+        std::size_t task = place * stride_of_tries();
+        if (!tries.is_open()) {
+            const KernelTable::Batch best = kernel(tries.best());
+            for (std::size_t k = 0; k < kTasksOfTry; ++k) run_task(task + k, best, batch);
+            return;
         }
-        if (tries_made_ < kTries) return plan_.kernel;
-        return compare(tries) < plan_.packets_below ? KernelTable::kPacket16 : plan_.kernel;
-    }
-
-    template <class KernelOf>
-    [[nodiscard]] Try try_both(const KernelOf& kernel, const TraceBatch& batch) const {
-        std::size_t task = place_of_try(tries_made_) * stride_of_tries();
         // Of two tasks the first finds the rays' part of the scene, the kernel's code and its
         // branches out of the caches, and does not count.
         const auto second_of_two = [&](KernelTable::Kernel which) {
@@ -168,11 +146,11 @@ private:
             run_task(task++, kernel(which), batch);
             return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         };
-        Try out;
-        if (tries_made_ % 2 == 0) out.planned = second_of_two(plan_.kernel);
-        out.packets = second_of_two(KernelTable::kPacket16);
-        if (tries_made_ % 2 != 0) out.planned = second_of_two(plan_.kernel);
-        return out;
+        PacketTries::Try made;
+        if (i % 2 == 0) made.planned = second_of_two(plan_.kernel);
+        made.packets = second_of_two(KernelTable::kPacket16);
+        if (i % 2 != 0) made.planned = second_of_two(plan_.kernel);
+        tries.add(made);
     }
 
     void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
@@ -193,7 +171,6 @@ private:
     TracePlan plan_;
     RayTasks tasks_;
     bool tries_;  ///< whether to find the kernel by trying
-    std::size_t tries_made_ = 0;
     mutable std::mutex stats_mutex_;
 };
 

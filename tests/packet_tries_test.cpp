@@ -1,0 +1,34 @@
+// When packets are taken for faster than the kernel that was planned.
+#include "schedule/packet_tries.h"
+
+#include <doctest/doctest.h>
+
+using namespace packet;
+
+TEST_CASE("two tries in a row without hope end it") {
+    PacketTries tries(KernelTable::kTile, 0.95);
+    tries.add({1.0, 2.0});
+    tries.add({1.0, 0.5});
+    tries.add({1.0, 1.3});
+    CHECK(tries.is_open());
+    tries.add({1.0, 1.3});
+    CHECK_FALSE(tries.is_open());
+    CHECK(tries.best() == KernelTable::kTile);
+}
+
+TEST_CASE("packets that are faster in all take the rest, though one task was interrupted") {
+    for (const bool are_faster : {false, true}) {
+        PacketTries tries(KernelTable::kTile, 0.95);
+        for (std::size_t i = 0; i < PacketTries::kCount; ++i) {
+            CHECK(tries.is_open());
+            CHECK(tries.best() == KernelTable::kTile);
+            PacketTries::Try made{1.0, are_faster ? 0.9 : 1.0};
+            if (i == 4) (are_faster ? made.packets : made.planned) += 100.0;
+            tries.add(made);
+        }
+        CHECK_FALSE(tries.is_open());
+        CHECK(tries.best() == (are_faster ? KernelTable::kPacket16 : KernelTable::kTile));
+        tries.add({1.0, 100.0});  // of a thread that was late
+        CHECK(tries.best() == (are_faster ? KernelTable::kPacket16 : KernelTable::kTile));
+    }
+}
