@@ -1,5 +1,5 @@
-// The triangle-box overlap tests for one box at a time. Builders that test several at once take them
-// from the KernelTable; the answers are the same.
+// The triangle-box overlap tests for one box at a time. Builders that test several at once take
+// them from the KernelTable; the answers are the same.
 #pragma once
 
 #include "kernels/triangle_box_axes.h"

@@ -222,9 +222,10 @@ struct FilteredOverlaps {
     std::uint32_t overlap, undecided;
 };
 
-/// The frame of both tests, of the first `count` boxes. `filter(prepared, boxes)` sorts N boxes into
-/// those that overlap for sure and those that may; the latter are decided exactly. No box overlaps a
-/// triangle that is not finite, and nothing overlaps a box with a NaN or with lower > upper.
+/// The frame of both tests, of the first `count` boxes. `filter(prepared, boxes)` sorts N boxes
+/// into those that overlap for sure and those that may; the latter are decided exactly. No box
+/// overlaps a triangle that is not finite, and nothing overlaps a box with a NaN or with lower >
+/// upper.
 template <int N, class Isa, int kMost, class Filter>
 PACKET_INLINE std::uint32_t find_overlaps(const float (&triangle)[3][3],
                                           const float (&lower)[3][kMost],
