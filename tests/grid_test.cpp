@@ -2,6 +2,7 @@
 // lose nothing.
 #include "configurations.h"
 #include "generate.h"
+#include "oracle.h"
 #include "share.h"
 #include "test_rays.h"
 
@@ -334,6 +335,22 @@ TEST_CASE("the cap on references holds, and coarsens the grid as far as it must"
     }
 }
 
+TEST_CASE("a sample of many triangles coarsens the grid no further than all of them would") {
+    const TriangleMesh mesh = tools::make_soup(70'000, 3);
+    const double limit = 3.0 * 70'000;
+    BuildOptions capped, free;
+    capped.max_reference_factor = 3.0f;
+    free.max_reference_factor = 64.0f;
+    const CellLists cells = sort_cells(mesh, 8.0, 2, capped);
+    CHECK(static_cast<double>(cells.ids.size()) <= limit);
+    double density = 8.0;
+    while (static_cast<double>(sort_cells(mesh, density, 2, free).ids.size()) > limit) {
+        density *= 0.5;
+    }
+    CHECK(density < 8.0);
+    CHECK(cells.ids == sort_cells(mesh, density, 2, free).ids);
+}
+
 TEST_CASE("hostile meshes build at once, and into little memory") {
     const auto check = [](const TriangleMesh& mesh) {
         for (const AccelKind kind : {AccelKind::kGrid, AccelKind::kGridOfTrees}) {
@@ -406,6 +423,30 @@ TEST_CASE("a grid of trees traces a teapot in a stadium with less work than a gr
     };
     CHECK(50 * work(AccelKind::kGridOfTrees) < work(AccelKind::kGrid));
     check_agreement(scene, rays, "teapot in a stadium");
+}
+
+TEST_CASE("trees of cells hold what is behind triangles that nothing can hit") {
+    const TriangleMesh pot = tools::make_stadium(5000);
+    TriangleMesh mesh = pot;
+    mesh.triangles.clear();
+    for (std::size_t i = 0; i < pot.triangles.size(); ++i) {
+        if (i % 7 == 3) mesh.triangles.push_back({0, 0, 0});
+        mesh.triangles.push_back(pot.triangles[i]);
+    }
+    Scene scene = make_scene(mesh);
+    BuildOptions options;
+    options.accel = AccelKind::kGridOfTrees;
+    scene.commit(options);
+    CHECK(scene.build_stats().node_count > 1000);
+    std::vector<Ray> rays;
+    tools::Random random(6);
+    for (int i = 0; i < 500; ++i) {
+        const glm::vec3 target = glm::vec3(0.0f, 0.7f, 0.0f) + random.direction();
+        rays.push_back(aim(target + 5.0f * random.direction(), target));
+    }
+    std::vector<Hit> hits(rays.size());
+    trace_closest(scene, rays, hits);
+    CHECK(hits == Oracle(scene).closest(rays));
 }
 
 TEST_SUITE_BEGIN("agreement");
