@@ -37,6 +37,32 @@ TEST_CASE("larger scenes of every kind") {
     }
 }
 
+TEST_CASE("tiles of rays that do not cohere") {
+    // In mode tile more rays than these would go by streams.
+    constexpr std::size_t kTogether = 1000;
+    Scene scene = make_scene(tools::make_city(share_of(20000, 3000), 5));
+    scene.commit();
+    const std::vector<Ray> rays = random_rays(scene.bounds(), 4 * kTogether, 29);
+    std::vector<Hit> want(rays.size()), got(rays.size());
+    TraceOptions options;
+    options.mode = Mode::kSingle, options.isa = IsaId::kScalar;
+    trace_closest(scene, rays, want, options);
+    options.mode = Mode::kTile;
+    for (const IsaId isa : built_isas()) {
+        if (!cpu_supports(isa)) continue;
+        CAPTURE(to_string(isa));
+        options.isa = isa;
+        for (std::size_t i = 0; i < rays.size(); i += kTogether) {
+            trace_closest(scene, std::span(rays).subspan(i, kTogether),
+                          std::span(got).subspan(i, kTogether), options);
+        }
+        CHECK(count_differences(rays, want, got) == 0);
+        got.assign(rays.size(), {});
+        trace_closest(scene, rays, got, options);
+        CHECK(count_differences(rays, want, got) == 0);
+    }
+}
+
 TEST_CASE("rays at every vertex, edge and interior of a grid") {
     const glm::vec3 u(0.25f, 0.01f, 0.0f), v(-0.02f, 0.31f, 0.1f);
     TriangleMesh mesh = make_grid(12, 12, {-1.3f, -2.1f, 0.4f}, u, v);

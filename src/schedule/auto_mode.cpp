@@ -11,8 +11,9 @@ namespace {
 
 constexpr std::size_t kRunLength = 8;
 constexpr std::size_t kMostRuns = 64;
-// Neighbours within about 18 degrees: bounced rays never are, camera rays always.
-constexpr float kLeastCosine = 0.95f;
+// Neighbours within about 11 degrees: bounced rays never are, camera rays nearly always. Up to
+// there tiles or packets are faster than streams (docs/benchmarking.md#steps-walks-and-coherence).
+constexpr float kLeastCosine = 0.98f;
 // Of the scene's diagonal. Rays that start farther apart meet different leaves.
 constexpr float kFarthestOrigin = 0.05f;
 

@@ -43,24 +43,38 @@ TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
     return {KernelTable::kStream, together ? Sorting::kTogether : Sorting::kByTask};
 }
 
+/// Closest-hit, or any-hit of rays in the order in which they are to be traced.
+TracePlan plan_tiles() { return {.kernel = KernelTable::kTile, .packets_below = 0.95}; }
+
+/// Whether so many rays are worth sorting, and may be traced by streams.
+bool may_stream(const SceneAccel& scene, std::span<const Ray> rays) {
+    return rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
+}
+
 TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode) {
-    if (mode == Mode::kTreelet && has_treelets(scene.view)) return plan_treelets();
-    if (mode == Mode::kTreelet || mode == Mode::kStream) {
-        if (!has_one_tree(scene.view)) return {KernelTable::kSingle};
-        return plan_streams(scene, rays);
+    switch (mode) {
+        case Mode::kTreelet:
+            if (has_treelets(scene.view)) return plan_treelets();
+            [[fallthrough]];
+        case Mode::kStream:
+            if (has_one_tree(scene.view)) return plan_streams(scene, rays);
+            return {KernelTable::kSingle};
+        case Mode::kTile:
+            // Rays that do not cohere fit no beam, and tiles would be packets, the slowest of all.
+            if (may_stream(scene, rays) && choose_mode(rays, scene.top.bounds) != Mode::kTile) {
+                return plan_streams(scene, rays);
+            }
+            return plan_tiles();
+        default: return {kernel_of(mode)};
     }
-    return {kernel_of(mode)};
 }
 
 /// As the rays and the query suggest: docs/benchmarking.md#beside-embree.
 TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
                         int threads) {
-    const bool may_stream = rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
     const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
     if (is_coherent) {
-        if (!may_stream || query == TraceQuery::kClosest) {
-            return {.kernel = KernelTable::kTile, .packets_below = 0.95};
-        }
+        if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles();
         return {KernelTable::kSorted, Sorting::kByTask};
     }
     if (has_treelets(scene.view) && rays.size() >= kLeastRaysTogether &&
@@ -68,7 +82,7 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
                             scene.stats.sah_cost, threads)) {
         return plan_treelets();
     }
-    if (may_stream) return plan_streams(scene, rays);
+    if (may_stream(scene, rays)) return plan_streams(scene, rays);
     return {.kernel = KernelTable::kSingle, .packets_below = 1.0};
 }
 
