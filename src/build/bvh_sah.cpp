@@ -16,7 +16,7 @@ public:
 
     std::optional<Halves> operator()(const NodeRange& node, int depth) const {
         if (is_surely_leaf(node, costs_)) return {};
-        const ObjectSplit split = find_object_split(node, costs_, parallel_);
+        const ObjectSplit split = find_object_split(node, costs_, parallel_, SplitSearch::kSampled);
         if (is_leaf(node, split.cost, costs_)) return {};
         return split_objects(node, split, depth, parallel_);
     }

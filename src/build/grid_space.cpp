@@ -68,7 +68,8 @@ int GridSpace::cell_at(int axis, float x) const noexcept {
 CellRange GridSpace::range_of(const Bounds3f& box) const noexcept {
     CellRange out;
     for (int a = 0; a < 3; ++a) {
-        out.first[a] = cell_at(a, box.lower[a]);
+        out.first[a] = out.last[a] = cell_at(a, box.lower[a]);
+        if (box.upper[a] <= plane(a, out.first[a] + 1)) continue;
         out.last[a] = cell_at(a, box.upper[a]);
         while (out.last[a] > out.first[a] && plane(a, out.last[a]) >= box.upper[a]) {
             --out.last[a];

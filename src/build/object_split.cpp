@@ -47,6 +47,12 @@ struct Bins {
     }
 };
 
+/// One in so many is looked at. Odd, since meshes are often made of pairs of triangles.
+std::size_t sample_step(std::size_t count) {
+    constexpr std::size_t kFewestSamples = 4096, kLongestStep = 7;
+    return std::min(count / kFewestSamples | 1, kLongestStep);
+}
+
 /// Few references along each axis, by their centroids and then as they come.
 struct Orders {
     std::uint8_t axis[3][kFewReferences];
@@ -131,9 +137,11 @@ std::size_t part_few(ReferenceSpan refs, const ObjectSplit& split) {
     return out.bounds();
 }
 
-/// Sorts references by their bins; yields how many go first, and fills the bounds of each side's
-/// centroids. Without branches: where a reference goes is anybody's guess.
-std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, NodeBounds (&bounds)[2]) {
+/// Sorts references by their bins; yields how many go first, and fills the bounds of each side,
+/// or those that the split does not know. Without branches: where a reference goes is anybody's
+/// guess.
+std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, const Parallel& parallel,
+                         NodeBounds (&bounds)[2]) {
     std::size_t first = 0;
     for (std::size_t i = 0; i < refs.size(); ++i) {
         const Reference r = refs[i];
@@ -144,6 +152,11 @@ std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, NodeBound
     }
     const ReferenceSpan sides[2] = {refs.first(first), refs.subspan(first)};
     for (int side = 0; side < 2; ++side) {
+        if (split.is_sampled) {
+            bounds[side] = measure(sides[side], parallel);
+            continue;
+        }
+        bounds[side].box = split.bounds[side];
         if (sides[side].size() > kFewReferences)
             bounds[side].centroids = centroid_bounds(sides[side]);
     }
@@ -153,16 +166,18 @@ std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, NodeBound
 }  // namespace
 
 ObjectSplit find_object_split(const NodeRange& node, const SahCosts& costs,
-                              const Parallel& parallel) {
+                              const Parallel& parallel, SplitSearch search) {
     const CountUnit unit(node.refs.size(), costs);
     if (node.refs.size() <= kFewReferences) return split_few(node.refs, unit);
     ObjectSplit best;
     const Binning& binning = best.binning = Binning(node.bounds.centroids);
     if (!binning.splits_any()) return best;
+    const std::size_t step = search == SplitSearch::kSampled ? sample_step(node.refs.size()) : 1;
+    best.is_sampled = step != 1;
     const Bins bins = fold_references<Bins>(
         node.refs, parallel,
         [&](Bins& out, ReferenceSpan piece) {
-            for (const Reference& r : piece) out.add(r, binning);
+            for (std::size_t i = 0; i < piece.size(); i += step) out.add(piece[i], binning);
         },
         [](Bins& a, const Bins& b) { a.add(b); });
     const Borders borders = find_borders(bins.bin, unit, std::numeric_limits<float>::infinity());
@@ -197,11 +212,13 @@ Halves split_objects(const NodeRange& node, const ObjectSplit& split, int depth,
                      const Parallel& parallel) {
     if (split.axis >= 0) {
         NodeBounds bounds[2];
-        const std::size_t first = node.refs.size() <= kFewReferences
-                                      ? part_few(node.refs, split)
-                                      : part_by_bins(node.refs, split, bounds);
-        bounds[0].box = split.bounds[0];
-        bounds[1].box = split.bounds[1];
+        std::size_t first = 0;
+        if (node.refs.size() <= kFewReferences) {
+            first = part_few(node.refs, split);
+            for (int side = 0; side < 2; ++side) bounds[side].box = split.bounds[side];
+        } else {
+            first = part_by_bins(node.refs, split, parallel, bounds);
+        }
         if (is_allowed(first, node.refs.size(), depth)) {
             return divide(node, first, bounds[0], bounds[1]);
         }

@@ -48,15 +48,23 @@ struct ObjectSplit {
     float cost = std::numeric_limits<float>::infinity();  ///< of both halves: area times CountUnit
     int axis = -1;                                        ///< -1: none
     int place = 0;                       ///< bins below this go first, or so many if they are few
-    Bounds3f bounds[2];                  ///< of the halves
+    Bounds3f bounds[2];                  ///< of the halves, unless it is sampled
+    bool is_sampled = false;             ///< found from some of the references
     Binning binning;                     ///< if they are not few
     std::uint8_t order[kFewReferences];  ///< if they are few: along the axis
+};
+
+/// Whether splits look at all references.
+enum class SplitSearch {
+    kAll,
+    kSampled  ///< of many references, at some: for who does not need to know what halves cost
 };
 
 /// The cheapest split, if centroids can be told apart. O(references), on several threads if they
 /// are many.
 [[nodiscard]] ObjectSplit find_object_split(const NodeRange& node, const SahCosts& costs,
-                                            const Parallel& parallel);
+                                            const Parallel& parallel,
+                                            SplitSearch search = SplitSearch::kAll);
 
 /// Whether a node is better a leaf, and may be one, than split at a cost of area times count.
 [[nodiscard]] bool is_leaf(const NodeRange& node, float split_cost, const SahCosts& costs);
