@@ -5,6 +5,7 @@
 """
 
 import csv
+import os
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -16,7 +17,7 @@ import matplotlib.pyplot as plt
 
 MODES = ["single", "stream", "treelet", "Embree"]
 COLORS = dict(zip(MODES, ["C0", "C4", "C3", "C7"]))
-CACHE = 32 << 20  # of the last level, where this is drawn
+CACHE = os.sysconf("SC_LEVEL3_CACHE_SIZE")  # in bytes, where this is drawn; 0 if unknown
 
 
 def read(path):
@@ -67,7 +68,8 @@ def plot(results, folder):
         for mode in MODES:
             axis.plot([point[0] / 1e6 for point in lines[mode]], [point[2] for point in lines[mode]],
                       marker=".", label=mode, color=COLORS[mode])
-        axis.axvline(CACHE / 1e6, color="black", linestyle=":", linewidth=1)
+        if CACHE > 0:
+            axis.axvline(CACHE / 1e6, color="black", linestyle=":", linewidth=1)
         axis.set_xscale("log")
         axis.set_ylim(bottom=0)
         axis.grid(alpha=0.3)
