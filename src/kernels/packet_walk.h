@@ -81,9 +81,17 @@ private:
             const BoxPlanes<directions, N, Isa> planes(node, child, ray_.near_side);
             const Interval<N, Isa> box = planes.slabs(ray_);
             const M met = meets(ray_, box, best_t_) & active;
-            if (none(met)) continue;
-            prefetch(tree_, node.child[child]);
-            push({select(met, box.enter, F(__builtin_huge_valf())), node.child[child]}, bottom);
+            const Entry entry = {select(met, box.enter, F(__builtin_huge_valf())),
+                                 node.child[child]};
+            if constexpr (query == Query::kAny) {
+                // No branch: whether a child is met is anybody's guess.
+                prefetch(tree_, entry.child);
+                stack_[size_] = entry;
+                size_ += any(met) ? 1 : 0;
+            } else if (any(met)) {
+                prefetch(tree_, entry.child);
+                push(entry, bottom);
+            }
         }
         if (size_ == bottom) return false;
         --size_;
@@ -91,14 +99,11 @@ private:
         active = stack_[size_].enter <= best_t_;
         return true;
     }
-    /// For closest-hit onto those of the node's other children, from `bottom` on, that no lane
-    /// enters later.
+    /// Onto those of the node's other children, from `bottom` on, that no lane enters later.
     PACKET_INLINE void push(const Entry& entry, int bottom) {
         int place = size_++;
-        if constexpr (query == Query::kClosest) {
-            for (; place > bottom && none(entry.enter < stack_[place - 1].enter); --place) {
-                stack_[place] = stack_[place - 1];
-            }
+        for (; place > bottom && none(entry.enter < stack_[place - 1].enter); --place) {
+            stack_[place] = stack_[place - 1];
         }
         stack_[place] = entry;
     }

@@ -109,18 +109,24 @@ private:
         for (; left != 0; left &= left - 1) {
             const int p = __builtin_ctz(left);
             const M active = meets(rays_[p], planes.slabs(rays_[p]), best_[p].t);
-            if (none(active)) continue;
-            if (!is_leaf) stats_.visit(count(active), N);
             if (query == Query::kClosest && !is_leaf) {
+                if (none(active)) continue;
+                stats_.visit(count(active), N);
                 count_visits(planes, left & (left - 1));
                 return left;
             }
+            // No branch from here on: which packets meet a box is anybody's guess.
+            const auto lanes = static_cast<std::uint32_t>(count(active));
+            const std::uint32_t is_met = lanes != 0 ? 1 : 0;
+            if constexpr (Stats::kCounts) {
+                if (!is_leaf && is_met != 0) stats_.visit(count(active), N);
+            }
             active_[p] = active;
             if constexpr (query == Query::kAny) {
-                use_.lanes += static_cast<std::uint32_t>(count(active));
-                ++use_.packets;
+                use_.lanes += lanes;
+                use_.packets += is_met;
             }
-            out |= 1u << p;
+            out |= is_met << p;
         }
         return out;
     }
