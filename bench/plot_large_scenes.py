@@ -5,7 +5,7 @@
 """
 
 import csv
-import os
+import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -17,7 +17,13 @@ import matplotlib.pyplot as plt
 
 MODES = ["single", "stream", "treelet", "Embree"]
 COLORS = dict(zip(MODES, ["C0", "C4", "C3", "C7"]))
-CACHE = os.sysconf("SC_LEVEL3_CACHE_SIZE")  # in bytes, where this is drawn; 0 if unknown
+
+
+def cache_bytes():
+    """Of the last level, where this is drawn; 0 if unknown."""
+    known = subprocess.run(["getconf", "LEVEL3_CACHE_SIZE"], capture_output=True, text=True,
+                           check=False)
+    return int(known.stdout.strip() or 0) if known.returncode == 0 else 0
 
 
 def read(path):
@@ -59,6 +65,7 @@ def print_tables(results):
 
 
 def plot(results, folder):
+    cache = cache_bytes()
     columns = list(dict.fromkeys((rays, threads) for _, rays, threads in results))
     scenes = list(dict.fromkeys(scene for scene, _, _ in results))
     figure, axes = plt.subplots(len(scenes), len(columns), squeeze=False, sharex=True,
@@ -68,8 +75,8 @@ def plot(results, folder):
         for mode in MODES:
             axis.plot([point[0] / 1e6 for point in lines[mode]], [point[2] for point in lines[mode]],
                       marker=".", label=mode, color=COLORS[mode])
-        if CACHE > 0:
-            axis.axvline(CACHE / 1e6, color="black", linestyle=":", linewidth=1)
+        if cache > 0:
+            axis.axvline(cache / 1e6, color="black", linestyle=":", linewidth=1)
         axis.set_xscale("log")
         axis.set_ylim(bottom=0)
         axis.grid(alpha=0.3)
