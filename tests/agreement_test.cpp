@@ -52,14 +52,19 @@ TEST_CASE("tiles of rays that do not cohere") {
         if (!cpu_supports(isa)) continue;
         CAPTURE(to_string(isa));
         options.isa = isa;
+        TraceStats by_tiles, by_streams;
+        options.stats = &by_tiles;
         for (std::size_t i = 0; i < rays.size(); i += kTogether) {
             trace_closest(scene, std::span(rays).subspan(i, kTogether),
                           std::span(got).subspan(i, kTogether), options);
         }
         CHECK(count_differences(rays, want, got) == 0);
         got.assign(rays.size(), {});
+        options.stats = &by_streams;
         trace_closest(scene, rays, got, options);
         CHECK(count_differences(rays, want, got) == 0);
+        CHECK(by_tiles.lane_utilization() < 1.0);
+        CHECK(by_streams.lane_utilization() == 1.0);  // rays of streams are never idle
     }
 }
 

@@ -137,9 +137,8 @@ std::size_t part_few(ReferenceSpan refs, const ObjectSplit& split) {
     return out.bounds();
 }
 
-/// Sorts references by their bins; yields how many go first, and fills the bounds of each side,
-/// or those that the split does not know. Without branches: where a reference goes is anybody's
-/// guess.
+/// Sorts references by their bins; yields how many go first, and fills the bounds of each side.
+/// Without branches: where a reference goes is anybody's guess.
 std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, const Parallel& parallel,
                          NodeBounds (&bounds)[2]) {
     std::size_t first = 0;
