@@ -4,6 +4,7 @@
 #include "share.h"
 #include "test_rays.h"
 
+#include "build/bvh_sah.h"
 #include "build/tree.h"
 #include "build/validate_tree.h"
 
@@ -13,6 +14,7 @@
 #include <cmath>
 #include <cstring>
 #include <span>
+#include <utility>
 
 using namespace packet;
 using namespace packet::test;
@@ -317,6 +319,84 @@ TEST_CASE("the surface area heuristic beats halving") {
     CHECK(stats.leaf_count == (stats.node_count + 1) / 2);
     CHECK(stats.sah_cost > 1.0);
     CHECK(stats.sah_cost < 60.0);  // halving along the widest axis comes to over 100 here
+}
+
+namespace {
+
+/// Checks that a hierarchy holds each of the references once, in boxes that contain theirs.
+void check_hierarchy(const Hierarchy& hierarchy, const ScratchVector<Reference>& references) {
+    std::vector<int> times(references.size());
+    std::vector<std::pair<std::uint32_t, int>> stack = {{0, 0}};
+    while (!stack.empty()) {
+        const auto [id, depth] = stack.back();
+        stack.pop_back();
+        const BuildNode& node = hierarchy.nodes.at(id);
+        CHECK(depth <= kMaxDepth);
+        for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+            const std::uint32_t reference = hierarchy.ids.at(i);
+            ++times.at(reference);
+            CHECK(node.bounds.contains(references[reference].bounds()));
+        }
+        if (node.is_leaf()) continue;
+        for (const std::uint32_t child : {node.first, node.second}) {
+            CHECK(node.bounds.contains(hierarchy.nodes.at(child).bounds));
+            stack.emplace_back(child, depth + 1);
+        }
+    }
+    CHECK(std::ranges::count(times, 1) == static_cast<std::ptrdiff_t>(times.size()));
+}
+
+ScratchVector<Reference> point_references(std::size_t count, const auto& point) {
+    ScratchVector<Reference> out(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const glm::vec3 at = point(i);
+        out[i] = {at, static_cast<std::uint32_t>(i), at};
+    }
+    return out;
+}
+
+}  // namespace
+
+TEST_CASE("trees by cells cost little more than others, and are the same for all threads") {
+    // Enough to be cut into pieces. Triangles of the soup fill space, the others' form surfaces.
+    for (const auto& make : {tools::make_soup, tools::make_terrain, tools::make_stadium}) {
+        const TriangleMesh mesh = make(70000, 3);
+        const BuildOptions options;
+        const Parallel one(1), two(2);
+        const References references = collect_references(mesh.view(), one);
+        const Hierarchy by_cells = build_bvh_sah_by_cells(references.items, options, one);
+        check_hierarchy(by_cells, references.items);
+        const auto cost = [&](const Hierarchy& hierarchy) {
+            return make_tree(hierarchy, mesh.view(), options, one).stats.sah_cost;
+        };
+        CHECK(cost(by_cells) < 1.15 * cost(build_bvh_sah(references.items, options, one)));
+        const Tree tree = make_tree(by_cells, mesh.view(), options, one);
+        const Hierarchy again = build_bvh_sah_by_cells(references.items, options, two);
+        CHECK(bytes_of(make_tree(again, mesh.view(), options, two)) == bytes_of(tree));
+    }
+}
+
+TEST_CASE("trees by cells hold whatever boxes there are") {
+    const auto same = [](std::size_t) { return glm::vec3(1.0f, 2.0f, 3.0f); };
+    const auto line = [](std::size_t i) { return glm::vec3(0.0f, static_cast<float>(i), 5.0f); };
+    const auto growing = [](std::size_t i) {
+        return glm::vec3(std::pow(1.02f, static_cast<float>(i)), 0.0f, 0.0f);
+    };
+    const auto tiny = [](std::size_t i) { return glm::vec3(1e-45f * static_cast<float>(i % 3)); };
+    const auto huge = [](std::size_t i) { return glm::vec3(i % 2 == 0 ? 3e38f : -3e38f); };
+    const BuildOptions options;
+    const Parallel parallel(1);
+    const auto check = [&](const auto& point) {
+        for (const std::size_t count : {2047u, 2048u, 4000u}) {
+            const ScratchVector<Reference> references = point_references(count, point);
+            check_hierarchy(build_bvh_sah_by_cells(references, options, parallel), references);
+        }
+    };
+    check(same);
+    check(line);
+    check(growing);
+    check(tiny);
+    check(huge);
 }
 
 TEST_CASE("bad options and bad indices are errors that name them") {

@@ -1,7 +1,6 @@
 #include "build/grid_of_trees.h"
 
 #include "build/bvh_sah.h"
-#include "build/clip.h"
 #include "build/grid_layout.h"
 
 #include <algorithm>
@@ -22,35 +21,34 @@ constexpr double kShareOfGrid = 0.3, kShareOfTrees = 0.7;
 // Trees of more references than this are built by all threads, one after the other.
 constexpr std::uint32_t kSharedTree = 65536;
 
-/// The triangles' references, by id.
+/// Where triangles' references are, by id: behind skipped ones not where their ids say.
 class ReferenceOf {
 public:
-    ReferenceOf(MeshView mesh, const ScratchVector<Reference>& references)
-        : references_(references), skipped_(mesh.triangles.size() - references.size()) {}
+    ReferenceOf(MeshView mesh, const ScratchVector<Reference>& references, const Parallel& parallel)
+        : references_(references) {
+        if (references.size() == mesh.triangles.size()) return;
+        place_.resize(mesh.triangles.size());
+        constexpr std::size_t kGrain = 65536;
+        parallel.for_pieces(references.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                place_[references[i].id] = static_cast<std::uint32_t>(i);
+            }
+        });
+    }
 
     [[nodiscard]] const Reference& operator()(std::uint32_t id) const {
-        // They are in order, and no more are missing before one than in all.
-        const std::size_t last = std::min<std::size_t>(id, references_.size() - 1);
-        const std::size_t first = id < skipped_ ? 0 : id - skipped_;
-        const auto at = [&](std::size_t i) {
-            return references_.begin() + static_cast<std::ptrdiff_t>(i);
-        };
-        const auto has_lower_id = [](const Reference& r, std::uint32_t i) { return r.id < i; };
-        return *std::lower_bound(at(first), at(last), id, has_lower_id);
+        return references_[place_.empty() ? id : place_[id]];
     }
 
 private:
     const ScratchVector<Reference>& references_;
-    std::size_t skipped_;
+    ScratchVector<std::uint32_t> place_;
 };
 
-/// That of the part of a triangle in a cell.
-Reference clip_to(const Bounds3f& cell, const Reference& reference, MeshView mesh) {
-    if (cell.contains(reference.bounds())) return reference;
-    const glm::uvec3 t = mesh.triangles[reference.id];
-    const glm::vec3 corners[3] = {mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z]};
-    const Bounds3f box = clip_triangle(corners, cell);
-    return {box.lower, reference.id, box.upper};
+/// What of its box is in a cell: cutting the triangle itself costs more than it gains.
+Reference clip_to(const Bounds3f& cell, const Reference& reference) {
+    return {glm::max(reference.lower, cell.lower), reference.id,
+            glm::min(reference.upper, cell.upper)};
 }
 
 class TreesBuilder {
@@ -59,7 +57,7 @@ public:
                  const BuildOptions& options, const Parallel& parallel)
         : cells_(cells),
           mesh_(mesh),
-          reference_of_(mesh, references),
+          reference_of_(mesh, references, parallel),
           options_(options),
           parallel_(parallel) {
         for (std::size_t i = 0; i < cells.lists.size(); ++i) {
@@ -101,10 +99,10 @@ private:
         const Bounds3f cell = cells_.space.box_of(cells_.space.cell_of(in.cell));
         ScratchVector<Reference> references(in.count);
         for (std::size_t i = 0; i < in.count; ++i) {
-            references[i] = clip_to(cell, reference_of_(cells_.ids[in.first + i]), mesh_);
+            references[i] = clip_to(cell, reference_of_(cells_.ids[in.first + i]));
         }
-        return make_tree(build_bvh_sah(std::move(references), options_, parallel), mesh_, options_,
-                         parallel);
+        return make_tree(build_bvh_sah_by_cells(std::move(references), options_, parallel), mesh_,
+                         options_, parallel);
     }
 
     /// Makes room for the trees behind what there is, and adds up their statistics.

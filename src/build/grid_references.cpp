@@ -159,7 +159,7 @@ struct Groups {
     std::size_t count;
 
     explicit Groups(const GridSpace& space) {
-        const std::size_t highest = 64 * space.brick_count() - 1;
+        const std::size_t highest = space.cell_id_end() - 1;
         shift = std::max(6, static_cast<int>(std::bit_width(highest / kMostGroups)));
         count = (highest >> shift) + 1;
     }

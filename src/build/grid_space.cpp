@@ -55,11 +55,8 @@ GridSpace::GridSpace(const Bounds3f& bounds, double cell_count) : bounds_(bounds
     }
 }
 
-/// The last cell that begins at x or below.
-int GridSpace::cell_at(int axis, float x) const noexcept {
+int GridSpace::cell_near(int axis, int cell, float x) const noexcept {
     const float* const planes = planes_[axis].data();
-    const double guess = static_cast<double>(x - bounds_.lower[axis]) * cells_per_unit_[axis];
-    int cell = std::min(static_cast<int>(guess), side_[axis] - 1);
     while (cell > 0 && planes[cell] > x) --cell;
     while (cell + 1 < side_[axis] && planes[cell + 1] <= x) ++cell;
     return cell;

@@ -7,6 +7,7 @@
 
 #include <packet/bounds.h>
 
+#include <algorithm>
 #include <cstdint>
 
 namespace packet {
@@ -48,6 +49,8 @@ public:
         return static_cast<std::size_t>(brick_side(0)) * static_cast<std::size_t>(brick_side(1)) *
                static_cast<std::size_t>(brick_side(2));
     }
+    /// Numbers of cells are below this.
+    [[nodiscard]] std::size_t cell_id_end() const noexcept { return 64 * brick_count(); }
     [[nodiscard]] const AlignedVector<float>& planes(int axis) const noexcept {
         return planes_[axis];
     }
@@ -72,11 +75,23 @@ public:
         return id_of_[0][static_cast<std::size_t>(x)] + id_of_[1][static_cast<std::size_t>(y)] +
                id_of_[2][static_cast<std::size_t>(z)];
     }
+    /// The number of the cell that a point within the bounds is in.
+    [[nodiscard]] std::uint32_t cell_id(const glm::vec3& point) const noexcept {
+        return cell_id(cell_at(0, point.x), cell_at(1, point.y), cell_at(2, point.z));
+    }
     /// The cell of a number.
     [[nodiscard]] CellRange cell_of(std::uint32_t id) const noexcept;
 
 private:
-    [[nodiscard]] int cell_at(int axis, float x) const noexcept;
+    /// The last cell that begins at x or below.
+    [[nodiscard]] int cell_at(int axis, float x) const noexcept {
+        const float* const planes = planes_[axis].data();
+        const double guess = static_cast<double>(x - bounds_.lower[axis]) * cells_per_unit_[axis];
+        const int cell = std::min(static_cast<int>(guess), side_[axis] - 1);
+        return planes[cell] <= x && x < planes[cell + 1] ? cell : cell_near(axis, cell, x);
+    }
+    /// The same, where a guess may be wrong.
+    [[nodiscard]] int cell_near(int axis, int cell, float x) const noexcept;
     [[nodiscard]] float plane(int axis, int i) const noexcept {
         return planes_[axis][static_cast<std::size_t>(i)];
     }

@@ -51,4 +51,22 @@ Halves divide(const NodeRange& node, std::size_t first, const Parallel& parallel
                   measure(node.refs.subspan(first), parallel));
 }
 
+std::vector<Leaf> leaves_of(const Hierarchy& hierarchy) {
+    std::vector<Leaf> out;
+    std::vector<Leaf> stack = {{0, 0, 0}};
+    while (!stack.empty()) {
+        Leaf at = stack.back();
+        stack.pop_back();
+        const BuildNode& node = hierarchy.nodes[at.node];
+        if (node.is_leaf()) {
+            at.id = hierarchy.ids[node.first];
+            out.push_back(at);
+        } else {
+            stack.push_back({node.second, 0, at.depth + 1});
+            stack.push_back({node.first, 0, at.depth + 1});
+        }
+    }
+    return out;
+}
+
 }  // namespace packet

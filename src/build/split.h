@@ -87,6 +87,15 @@ template <class Result, class FoldPiece, class Join>
 [[nodiscard]] Halves divide(const NodeRange& node, std::size_t first, const NodeBounds& bounds0,
                             const NodeBounds& bounds1);
 
+/// A leaf of one id.
+struct Leaf {
+    std::uint32_t node, id;
+    int depth;
+};
+
+/// Those of a hierarchy whose leaves are such.
+[[nodiscard]] std::vector<Leaf> leaves_of(const Hierarchy& hierarchy);
+
 /// Builds by splitting. `split(node, depth)` sorts at least two references at `depth` to two sides,
 /// which share their memory and room, or returns none for a leaf. It is called by several threads
 /// at once; is_allowed() must hold of what it returns.
@@ -106,15 +115,21 @@ public:
     }
 
     [[nodiscard]] Hierarchy build() && {
-        Hierarchy out;
-        if (count_ == 0) return out;
-        parallel_.run([&] {
-            build_root();
-            out.ids = ids_of(references_, parallel_);
+        if (count_ == 0) return {};
+        return build_by([&] { build_root(); });
+    }
+    /// Builds below `leaves` of a hierarchy whose ids are those of ranges. The ranges share out the
+    /// references where these were before they were moved here, and fit the leaves' depths.
+    [[nodiscard]] Hierarchy build_below(const Hierarchy& above, std::span<const Leaf> leaves,
+                                        std::span<const NodeRange> ranges) && {
+        return build_by([&] {
+            std::ranges::copy(above.nodes, nodes_.begin());
+            used_ = static_cast<std::uint32_t>(above.nodes.size());
+            constexpr std::size_t kGrain = 64;
+            parallel_.for_pieces(leaves.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+                build_ranges(leaves.subspan(begin, end - begin), ranges);
+            });
         });
-        nodes_.resize(used_);
-        out.nodes = std::move(nodes_);
-        return out;
     }
 
 private:
@@ -146,9 +161,31 @@ private:
         std::uint32_t needed_, next_ = 0, end_ = 0;
     };
 
+    template <class Build>
+    Hierarchy build_by(Build&& build) {
+        Hierarchy out;
+        parallel_.run([&] {
+            build();
+            out.ids = ids_of(references_, parallel_);
+        });
+        nodes_.resize(used_);
+        out.nodes = std::move(nodes_);
+        return out;
+    }
+
     void build_root() {
         const ReferenceSpan refs = std::span(references_).first(count_);
         build_task(0, {refs, measure(refs, parallel_), references_.size() - count_}, 0);
+    }
+
+    void build_ranges(std::span<const Leaf> leaves, std::span<const NodeRange> ranges) {
+        std::size_t capacity = 1;  // a range's root has its place
+        for (const Leaf& leaf : leaves) capacity += ranges[leaf.id].capacity() - 1;
+        Places places(used_, capacity);
+        for (const Leaf& leaf : leaves) {
+            build_node(leaf.node, ranges[leaf.id], leaf.depth, places);
+            advance(ranges[leaf.id]);
+        }
     }
 
     /// Splits large nodes, each in a task of its own.
