@@ -32,3 +32,22 @@ TEST_CASE("packets that are faster in all take the rest, though one task was int
         CHECK(tries.best() == (are_faster ? KernelTable::kPacket16 : KernelTable::kTile));
     }
 }
+
+TEST_CASE("four tries that leave little doubt end it for packets, whatever cheap ones say") {
+    PacketTries tries(KernelTable::kTile, 0.95);
+    tries.add({1.0, 0.7});
+    tries.add({0.1, 0.2});  // of rays that miss the scene
+    tries.add({1.0, 0.8});
+    CHECK(tries.is_open());
+    CHECK(tries.best() == KernelTable::kTile);
+    tries.add({0.1, 0.12});
+    CHECK_FALSE(tries.is_open());
+    CHECK(tries.best() == KernelTable::kPacket16);
+}
+
+TEST_CASE("one interrupted task among four is no proof") {
+    PacketTries tries(KernelTable::kTile, 0.95);
+    tries.add({100.0, 1.0});
+    for (int i = 0; i < 3; ++i) tries.add({1.0, 1.0});
+    CHECK(tries.is_open());
+}

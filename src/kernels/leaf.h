@@ -23,19 +23,6 @@ struct BlockRange {
     }
 };
 
-/// The lines of what is visited later are fetched when it is pushed, since scenes seldom fit into
-/// the second level's cache.
-PACKET_INLINE void prefetch(const TreeView& tree, const WideChild& child) {
-    const void* const at = child.is_leaf()
-                               ? static_cast<const void*>(tree.blocks + child.link / kBlockSize)
-                               : tree.wide_nodes + child.link;
-    constexpr std::size_t kLines = sizeof(TriangleBlock) / 64;
-    static_assert(sizeof(WideNode) <= sizeof(TriangleBlock));
-    for (std::size_t i = 0; i < kLines; ++i) {
-        __builtin_prefetch(static_cast<const char*>(at) + 64 * i);
-    }
-}
-
 /// A packet meets triangles one by one, each broadcast to all lanes.
 template <Query query, Directions directions, int N, class Isa>
 struct PacketLeaf {

@@ -10,6 +10,7 @@
 
 #include "kernels/box.h"
 #include "kernels/leaf.h"
+#include "kernels/prefetch.h"
 
 namespace packet {
 

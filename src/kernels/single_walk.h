@@ -8,6 +8,7 @@
 
 #include "kernels/best_hit.h"
 #include "kernels/box.h"
+#include "kernels/prefetch.h"
 #include "kernels/single_ray.h"
 
 namespace packet {
@@ -92,13 +93,15 @@ PACKET_INLINE void order(std::int32_t& a, std::int32_t& b) {
 }
 
 /// Takes one of the children of `bits` (not empty), for closest-hit the nearest, and pushes the
-/// others.
+/// others. For any-hit these are seldom come to soon enough to be worth fetching.
 template <Query query, class Isa>
-PACKET_INLINE WideChild descend(const WideNode& node, const Float<kWideSize, Isa>& enters,
-                                std::uint32_t bits, SingleStack& stack) {
+PACKET_INLINE WideChild descend(const TreeView& tree, const WideNode& node,
+                                const Float<kWideSize, Isa>& enters, std::uint32_t bits,
+                                SingleStack& stack) {
     float enter[kWideSize];
     const auto push = [&](std::int32_t key) {
         const int child = key & (kWideSize - 1);
+        if constexpr (query == Query::kClosest) prefetch(tree, node.child[child]);
         stack.push(node.child[child], enter[child]);
     };
     const int first = __builtin_ctz(bits);
@@ -142,7 +145,7 @@ PACKET_INLINE void walk_wide_tree(const TreeView& tree, const SingleRay& ray, co
             F enter;
             const std::uint32_t bits = wide.meets(node, farthest, enter);
             if (bits != 0) {
-                next = descend<query>(node, enter, bits, stack);
+                next = descend<query>(tree, node, enter, bits, stack);
             } else if (!stack.pop(best_t, next)) {
                 return;
             }

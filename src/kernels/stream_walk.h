@@ -9,6 +9,7 @@
 #pragma once
 
 #include "kernels/leaf.h"
+#include "kernels/prefetch.h"
 #include "kernels/transpose.h"
 
 namespace packet {

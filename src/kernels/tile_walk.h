@@ -10,6 +10,7 @@
 #include "kernels/beam.h"
 #include "kernels/box.h"
 #include "kernels/lone_lanes.h"
+#include "kernels/prefetch.h"
 
 namespace packet {
 

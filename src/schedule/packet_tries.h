@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cstddef>
 #include <mutex>
+#include <span>
 
 namespace packet {
 
@@ -29,29 +30,35 @@ public:
     /// As far as is known: the planned kernel, until there are enough tries.
     [[nodiscard]] KernelTable::Kernel best() const noexcept { return best_; }
 
-    /// Thread-safe. Two tries in a row without any hope for packets are enough, or kCount.
+    /// Thread-safe. Two tries in a row without any hope for packets are enough, or a few that leave
+    /// little doubt of them, or kCount.
     void add(const Try& made) {
         const std::scoped_lock lock(mutex_);
         if (!is_open_) return;
         tries_[made_++] = made;
-        if (made_ >= 2 && is_hopeless(tries_[made_ - 1]) && is_hopeless(tries_[made_ - 2])) {
-            is_open_ = false;
-        } else if (made_ == kCount) {
-            if (ratio() < packets_below_) best_ = KernelTable::kPacket16;
-            is_open_ = false;
-        }
+        const bool is_full = made_ == kCount;
+        const bool are_faster = made_ >= kFewest && ratio() < (is_full ? packets_below_ : kClearly);
+        const bool are_hopeless =
+            made_ >= 2 && is_hopeless(tries_[made_ - 1]) && is_hopeless(tries_[made_ - 2]);
+        if (are_faster) best_ = KernelTable::kPacket16;
+        if (is_full || are_faster || are_hopeless) is_open_ = false;
     }
 
 private:
+    static constexpr std::size_t kFewest = 4;
+    static constexpr double kClearly = 0.85;
+
     [[nodiscard]] static bool is_hopeless(const Try& t) { return t.packets > 1.25 * t.planned; }
-    /// The time of packets, in units of the other's. Without the two tries that speak most for
-    /// either, for the system may have interrupted them.
-    [[nodiscard]] double ratio() {
-        std::ranges::sort(tries_, {}, [](const Try& t) { return t.planned - t.packets; });
+    /// The time of packets so far, in units of the other's. Without the two tries that speak most
+    /// for either, for the system may have interrupted them.
+    [[nodiscard]] double ratio() const {
+        std::array<Try, kCount> sorted = tries_;
+        const std::span made = std::span(sorted).first(made_);
+        std::ranges::sort(made, {}, [](const Try& t) { return t.planned - t.packets; });
         Try sum;
-        for (std::size_t i = 1; i + 1 < kCount; ++i) {
-            sum.planned += tries_[i].planned;
-            sum.packets += tries_[i].packets;
+        for (const Try& t : made.subspan(1, made_ - 2)) {
+            sum.planned += t.planned;
+            sum.packets += t.packets;
         }
         return sum.packets / sum.planned;
     }

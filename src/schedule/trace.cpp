@@ -130,8 +130,8 @@ private:
     template <class KernelOf>
     void make_try(std::size_t i, const KernelOf& kernel, const TraceBatch& batch,
                   PacketTries& tries) const {
-        // The first few are spread over all, too: parts of an image differ.
-        const std::size_t place = (5 * i + 4) % PacketTries::kCount;
+        // The first two are of different halves, and so on: an image's upper half may be the sky.
+        const std::size_t place = (5 * i + 6) % PacketTries::kCount;
         std::size_t task = place * stride_of_tries();
         if (!tries.is_open()) {
             const KernelTable::Batch best = kernel(tries.best());
