@@ -8,6 +8,7 @@
 #pragma once
 
 #include "kernels/best_hit.h"
+#include "kernels/transpose.h"
 
 namespace packet {
 
@@ -50,16 +51,35 @@ struct LaneBounds {
     }
 };
 
+/// The smallest lane of each of eight values.
 template <int N, class Isa>
-PACKET_INLINE float smallest(const Float<N, Isa>& lanes) {
-    float value[N];
-    lanes.store(value);
-    for (int i = 1; i < N; ++i) value[0] = value[i] < value[0] ? value[i] : value[0];
-    return value[0];
-}
-template <int N, class Isa>
-PACKET_INLINE float largest(const Float<N, Isa>& lanes) {
-    return -smallest(Float<N, Isa>(0.0f) - lanes);
+PACKET_INLINE void smallest_lanes(const Float<N, Isa> (&in)[8], float (&out)[8]) {
+    static_assert(N % 8 == 0);
+    using Eight = Float<8, Isa>;
+    const auto row_of = [](const Eight& value) {
+        float lanes[8];
+        value.store(lanes);
+        return Floats8(*as_row(lanes));
+    };
+    Floats8 rows[8];
+    for (int i = 0; i < 8; ++i) {
+        float lanes[N];
+        in[i].store(lanes);
+        Eight least = Eight::load(lanes);
+        for (int k = 8; k < N; k += 8) least = min(least, Eight::load(lanes + k));
+        rows[i] = row_of(least);
+    }
+    transpose(rows);
+    Eight column[8];
+    for (int i = 0; i < 8; ++i) {
+        float lanes[8];
+        *as_row(lanes) = rows[i];
+        column[i] = Eight::load(lanes);
+    }
+    for (int step = 4; step > 0; step /= 2) {
+        for (int i = 0; i < step; ++i) column[i] = min(column[i], column[i + step]);
+    }
+    column[0].store(out);
 }
 
 /// Bounds the active lanes (best.t > kNever) of packets that share their directions.
@@ -78,8 +98,9 @@ public:
         for (int a = 0; a < 3; ++a) out.axis[a] = rays_[0].shear.axis[a];
         out.near_side = rays_[0].near_side[out.axis[2]];
         const float sign = out.near_side == 0 ? 1.0f : -1.0f;
-        LaneBounds<N, Isa> slope[2], begin, end, tnear;
+        LaneBounds<N, Isa> slope[2], begin, end;
         F first(__builtin_huge_valf()), margin(0.0f);
+        M looks_ahead = M::from_bits(~0u);
         for (int p = 0; p < packet_count_; ++p) {
             const PreparedRays<N, Isa>& ray = rays_[p];
             const M active = is_active(p);
@@ -87,18 +108,25 @@ public:
             slope[1].extend(active, ray.shear.shear_y);
             const F z = ray.shear.org[2] * F(sign), speed = abs(F(1.0f) / ray.hit.scale_z);
             first = min(first, select(active, z, first));
-            tnear.extend(active, ray.hit.tnear);
+            looks_ahead = looks_ahead & (~active | (ray.hit.tnear >= F(0.0f)));
             begin.extend(active, z + ray.hit.tnear * speed);
             end.extend(active, z + best_[p].t * speed);
             for (int a = 0; a < 3; ++a) {
                 margin = max(margin, select(active, ray.hit.org[0][a] - ray.hit.org[1][a], margin));
             }
         }
+        const F zero(0.0f);
+        const F values[8] = {
+            first,          begin.lower,    zero - end.upper,      zero - margin,
+            slope[0].lower, slope[1].lower, zero - slope[0].upper, zero - slope[1].upper};
+        float least[8];
+        smallest_lanes(values, least);
+        out.begin = least[1], out.end = -least[2];
         // The difference of the grown origins is twice the growth, which bounds a hit's rounding.
-        out.margin = 4.0f * largest(margin);
-        out.begin = smallest(begin.lower), out.end = largest(end.upper);
-        anchor(out, slope, smallest(first) * sign, out.end * sign, sign);
-        out.is_sound = smallest(tnear.lower) >= 0.0f && extent(out) < kFarthest;  // false for NaN
+        out.margin = -4.0f * least[3];
+        const float lowest[2] = {least[4], least[5]}, highest[2] = {-least[6], -least[7]};
+        anchor(out, lowest, highest, least[0] * sign, sign);
+        out.is_sound = none(~looks_ahead) && extent(out) < kFarthest;  // false for NaN
         return out;
     }
 
@@ -111,43 +139,47 @@ private:
         float lower[2], upper[2];
         PACKET_INLINE float spread() const { return upper[0] - lower[0] + (upper[1] - lower[1]); }
     };
-    /// Where the rays cross a plane of z.
-    PACKET_INLINE Crossing cross(float plane) const {
-        LaneBounds<N, Isa> bounds[2];
+    /// Where the rays cross two planes of z.
+    PACKET_INLINE void cross(const float (&plane)[2], Crossing (&out)[2]) const {
+        LaneBounds<N, Isa> bounds[2][2];
         for (int p = 0; p < packet_count_; ++p) {
             const ShearRays<N, Isa>& shear = rays_[p].shear;
-            const F way = F(plane) - shear.org[2];
-            bounds[0].extend(is_active(p), shear.org[0] + shear.shear_x * way);
-            bounds[1].extend(is_active(p), shear.org[1] + shear.shear_y * way);
+            const M active = is_active(p);
+            for (int i = 0; i < 2; ++i) {
+                const F way = F(plane[i]) - shear.org[2];
+                bounds[i][0].extend(active, shear.org[0] + shear.shear_x * way);
+                bounds[i][1].extend(active, shear.org[1] + shear.shear_y * way);
+            }
         }
-        Crossing out;
-        for (int a = 0; a < 2; ++a) {
-            out.lower[a] = smallest(bounds[a].lower);
-            out.upper[a] = largest(bounds[a].upper);
+        F values[8];
+        for (int i = 0; i < 4; ++i) {
+            values[2 * i] = bounds[i / 2][i % 2].lower;
+            values[2 * i + 1] = F(0.0f) - bounds[i / 2][i % 2].upper;
         }
-        return out;
+        float least[8];
+        smallest_lanes(values, least);
+        for (int i = 0; i < 4; ++i) {
+            out[i / 2].lower[i % 2] = least[2 * i];
+            out[i / 2].upper[i % 2] = -least[2 * i + 1];
+        }
     }
 
     /// Rays from an eye spread from their begin, rays to a light narrow to their end: the lines
     /// start where the rays are closest. After the anchor it is the ray of least slope that is
     /// lowest, before it that of greatest.
-    PACKET_INLINE void anchor(BeamBounds& out, const LaneBounds<N, Isa> (&slope)[2], float begin,
-                              float end, float sign) const {
-        Crossing crossing = cross(begin);
-        bool is_after = true;
-        out.anchor = begin;
-        if (out.end < kFarthest) {
-            const Crossing at_end = cross(end);
-            if (at_end.spread() < crossing.spread()) {
-                crossing = at_end;
-                is_after = false;
-                out.anchor = end;
-            }
-        }
+    PACKET_INLINE void anchor(BeamBounds& out, const float (&lowest)[2], const float (&highest)[2],
+                              float begin, float sign) const {
+        const bool has_end = out.end < kFarthest;
+        const float plane[2] = {begin, has_end ? out.end * sign : begin};
+        Crossing at[2];
+        cross(plane, at);
+        const bool is_after = !(has_end && at[1].spread() < at[0].spread());
+        const Crossing& crossing = at[is_after ? 0 : 1];
+        out.anchor = plane[is_after ? 0 : 1];
         const int lower = is_after == (sign > 0.0f) ? kLower : kUpper;
         for (int a = 0; a < 2; ++a) {
-            out.slope[a][lower] = smallest(slope[a].lower);
-            out.slope[a][1 - lower] = largest(slope[a].upper);
+            out.slope[a][lower] = lowest[a];
+            out.slope[a][1 - lower] = highest[a];
             out.offset[a][kLower] = crossing.lower[a];
             out.offset[a][kUpper] = crossing.upper[a];
         }
