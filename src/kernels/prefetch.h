@@ -11,13 +11,16 @@ namespace packet {
 /// The lines of what is visited later are fetched when it is pushed, since scenes seldom fit into
 /// the second level's cache.
 PACKET_INLINE void prefetch(const TreeView& tree, const WideChild& child) {
-    const void* const at = child.is_leaf()
-                               ? static_cast<const void*>(tree.blocks + child.link / kBlockSize)
-                               : tree.wide_nodes + child.link;
+    // No branch: whether a child is a leaf is anybody's guess.
+    const auto* const leaf = reinterpret_cast<const char*>(tree.blocks + child.link / kBlockSize);
+    const auto* const node =
+        reinterpret_cast<const char*>(tree.wide_nodes) + sizeof(WideNode) * std::size_t{child.link};
+    const auto is_leaf = static_cast<std::ptrdiff_t>(child.is_leaf());
+    const char* const at = node + (leaf - node) * is_leaf;
     constexpr std::size_t kLines = sizeof(TriangleBlock) / 64;
     static_assert(sizeof(WideNode) <= sizeof(TriangleBlock));
     for (std::size_t i = 0; i < kLines; ++i) {
-        __builtin_prefetch(static_cast<const char*>(at) + 64 * i);
+        __builtin_prefetch(at + 64 * i);
     }
 }
 
