@@ -1,5 +1,7 @@
 #include "contender.h"
 
+#include <timing.h>
+
 #include <cstddef>
 #include <utility>
 
@@ -52,14 +54,14 @@ Contender embree_contender(const EmbreeScene& scene, const EmbreeModeName& name,
     return {Side::kEmbree, std::string(name.name).append(" ").append(tree), trace, closest};
 }
 
-Answers answers_of(const Contender& contender, const RaySet& set, int threads) {
+std::pair<Answers, double> answers_of(const Contender& contender, const RaySet& set, int threads) {
     Answers answers = room_for(set);
-    contender.trace(set, answers, threads);
+    const double seconds = tools::seconds_of([&] { contender.trace(set, answers, threads); });
     if (contender.side == Side::kEmbree) {
         to_ray_order(set, answers.hits);
         to_ray_order(set, answers.occluded);
     }
-    return answers;
+    return {std::move(answers), seconds};
 }
 
 }  // namespace packet::bench

@@ -13,6 +13,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace packet::bench {
@@ -44,7 +45,8 @@ struct Contender {
 [[nodiscard]] Contender embree_contender(const EmbreeScene& scene, const EmbreeModeName& name,
                                          std::string_view tree);
 
-/// Traces once and puts the answers in the order of RaySet::rays.
-[[nodiscard]] Answers answers_of(const Contender& contender, const RaySet& set, int threads);
+/// Answers in the order of RaySet::rays, and the seconds that tracing took.
+[[nodiscard]] std::pair<Answers, double> answers_of(const Contender& contender, const RaySet& set,
+                                                    int threads);
 
 }  // namespace packet::bench

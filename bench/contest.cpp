@@ -51,16 +51,19 @@ double Score::median_seconds() const { return tools::median(seconds); }
 std::vector<Score> hold(const Contest& contest, MeshView mesh, const RaySet& set,
                         std::span<const Contender> contenders) {
     const Contender& first = contenders.front();
-    const Answers expected = answers_of(first, set, contest.threads);
+    Answers expected;
     std::vector<Score> scores;
     for (const Contender& contender : contenders) {
-        const Answers answers = answers_of(contender, set, contest.threads);
+        auto [answers, seconds] = answers_of(contender, set, contest.threads);
+        if (scores.empty()) expected = answers;
         const Agreement agreement = compare_answers(mesh, set, first, expected, contender, answers);
         scores.push_back({&contender, agreement, {}});
+        if (seconds >= kLongRun) scores.back().seconds.push_back(seconds);
     }
     Answers answers = room_for(set);
-    for (int repeat = 0; repeat < contest.repeats; ++repeat) {
+    for (int repeat = 1; repeat <= contest.repeats; ++repeat) {
         for (Score& score : scores) {
+            if (score.seconds.size() == static_cast<std::size_t>(repeat)) continue;
             const auto time = [&] {
                 return tools::seconds_of(
                     [&] { score.contender->trace(set, answers, contest.threads); });
