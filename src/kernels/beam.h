@@ -56,18 +56,14 @@ template <int N, class Isa>
 PACKET_INLINE void smallest_lanes(const Float<N, Isa> (&in)[8], float (&out)[8]) {
     static_assert(N % 8 == 0);
     using Eight = Float<8, Isa>;
-    const auto row_of = [](const Eight& value) {
-        float lanes[8];
-        value.store(lanes);
-        return Floats8(*as_row(lanes));
-    };
     Floats8 rows[8];
     for (int i = 0; i < 8; ++i) {
         float lanes[N];
         in[i].store(lanes);
         Eight least = Eight::load(lanes);
         for (int k = 8; k < N; k += 8) least = min(least, Eight::load(lanes + k));
-        rows[i] = row_of(least);
+        least.store(lanes);
+        rows[i] = *as_row(lanes);
     }
     transpose(rows);
     Eight column[8];
