@@ -15,7 +15,7 @@ namespace packet {
 
 /// The same in less time. Many references are first sorted into cells of a grid over their
 /// centroids; the tree's upper part has cells for leaves, and each cell's own part is built below.
-/// Nodes of the upper part cannot cut a cell: the tree's expected cost is up to an eighth higher,
+/// Nodes of the upper part cannot cut a cell: the tree's expected cost is up to a seventh higher,
 /// in some scenes lower. 36 bytes of scratch a reference more.
 ///
 /// Garanzha, Premoze, Bely, Galaktionov. Grid-based SAH BVH construction on a GPU. The Visual
