@@ -36,13 +36,17 @@ struct BestHits {
     PACKET_INLINE void enter_instance(std::int32_t id) {
         tie_prim_id = select(I(id) < instance_id, I(kNoId), I(-1));
     }
+    /// For any-hit, where no more is asked than that there is one: lanes that need look no further.
+    PACKET_INLINE void occlude(M hit) {
+        t = select(hit, F(kNever), t);
+        prim_id = select(hit, I(0), prim_id);
+    }
     /// `hit` lanes have new_t <= t.
     template <Query query>
     PACKET_INLINE void update(M hit, const F& new_t, const F& new_u, const F& new_v,
                               const I& new_prim_id, std::int32_t instance) {
         if constexpr (query == Query::kAny) {
-            t = select(hit, F(kNever), t);
-            prim_id = select(hit, new_prim_id, prim_id);
+            occlude(hit);
         } else {
             // if (new_t < t || new_prim_id < tie_prim_id) take it
             const M closer = hit & ((new_t < t) | (new_prim_id < tie_prim_id));
@@ -55,9 +59,9 @@ struct BestHits {
         }
     }
     /// A hit of one lane.
-    template <Query query, class Hit>
+    template <class Hit>
     PACKET_INLINE void update(const Hit& hit, std::int32_t instance, std::uint32_t lane_bit = 1) {
-        update<query>(M::from_bits(lane_bit), hit.t, hit.u, hit.v, hit.prim_id, instance);
+        update<Query::kClosest>(M::from_bits(lane_bit), hit.t, hit.u, hit.v, hit.prim_id, instance);
     }
     PACKET_INLINE M found() const { return prim_id < I(kNoId); }
 };

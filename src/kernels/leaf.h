@@ -41,11 +41,16 @@ struct PacketLeaf {
                             Mask<N, Isa> active) const {
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
-            const TriangleHits<N, Isa> hits =
-                meet_triangle<directions>(ray, best.t, active, SameTriangle{block, lane});
-            if (none(hits.hit)) continue;
-            best.template update<query>(hits.hit, hits.t, hits.u, hits.v,
-                                        Int<N, Isa>(block.prim_id[lane]), instance_id);
+            const SameTriangle triangle{block, lane};
+            if constexpr (query == Query::kAny) {
+                best.occlude(find_occluded<directions>(ray, best.t, active, triangle));
+            } else {
+                const TriangleHits<N, Isa> hits =
+                    meet_triangle<directions>(ray, best.t, active, triangle);
+                if (none(hits.hit)) continue;
+                best.template update<query>(hits.hit, hits.t, hits.u, hits.v,
+                                            Int<N, Isa>(block.prim_id[lane]), instance_id);
+            }
         }
     }
 };
@@ -86,6 +91,35 @@ PACKET_INLINE void meet_block(const ShearRays<kBlockSize, Isa>& shear_ray, const
     take(BlockHit{t[i], u[i], v[i], block.prim_id[i]});
 }
 
+/// Which of `candidates`, triangles of a block, the ray hits, all computed anew: rare, so that
+/// registers need not be kept for it.
+template <class Isa>
+PACKET_NOINLINE std::uint32_t decide_block(const SingleRay& ray, float best_t,
+                                           std::uint32_t candidates, const TriangleBlock& block) {
+    const BlockTriangles triangles{block};
+    return decide_hits(shear<Directions::kShared>(shear_of<kBlockSize, Isa>(ray), triangles),
+                       SingleHitRay<kBlockSize, Isa>(ray), Float<kBlockSize, Isa>(best_t),
+                       Mask<kBlockSize, Isa>::from_bits(candidates), triangles)
+        .hit.bits();
+}
+
+/// As meet_block(), for any-hit: the triangles that the ray hits, or one of them.
+template <class Isa>
+PACKET_INLINE std::uint32_t find_occluders(const ShearRays<kBlockSize, Isa>& shear_ray,
+                                           const SingleRay& ray, float best_t,
+                                           const TriangleBlock& block) {
+    const auto sheared = shear<Directions::kShared>(shear_ray, BlockTriangles{block});
+    const auto candidates = sheared.may_hit();
+    if (none(candidates)) return 0;
+    const Verdicts<kBlockSize, Isa> verdicts =
+        judge(sheared, SingleHitRay<kBlockSize, Isa>(ray), Float<kBlockSize, Isa>(best_t));
+    const std::uint32_t sure = (candidates & verdicts.hit).bits();
+    const std::uint32_t undecided = (candidates & ~verdicts.miss).bits();
+    if (sure != 0 || undecided == 0) [[likely]]
+        return sure;
+    return decide_block<Isa>(ray, best_t, undecided, block);
+}
+
 /// A single ray meets the blocks of a range.
 template <Query query, class Isa>
 struct SingleLeaf {
@@ -96,9 +130,15 @@ struct SingleLeaf {
 
     PACKET_INLINE void meet(BlockRange range) const {
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            meet_block(shear_of<kBlockSize, Isa>(opaque(ray)), ray, best.t.r[0], tree.blocks[b],
-                       [&](const BlockHit& hit) { best.template update<query>(hit, instance_id); });
-            if (query == Query::kAny && best.t.r[0] == kNever) return;
+            const auto shear = shear_of<kBlockSize, Isa>(opaque(ray));
+            if constexpr (query == Query::kAny) {
+                if (find_occluders(shear, ray, best.t.r[0], tree.blocks[b]) == 0) continue;
+                best.occlude(Mask<1, Isa>::from_bits(1));
+                return;
+            } else {
+                meet_block(shear, ray, best.t.r[0], tree.blocks[b],
+                           [&](const BlockHit& hit) { best.update(hit, instance_id); });
+            }
         }
     }
 };

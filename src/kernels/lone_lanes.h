@@ -51,11 +51,17 @@ private:
         return {lanes_[lane / kSingleLanes], lane % kSingleLanes};
     }
     PACKET_INLINE void meet(const TriangleBlock& block, int lane, const SingleRay& ray) {
-        meet_block(shear_of<kBlockSize, Isa>(ray), ray, best_t_[lane], block,
-                   [&](const BlockHit& hit) {
-                       best_.template update<query>(hit, instance_id_, 1u << lane);
-                       best_t_[lane] = query == Query::kAny ? kNever : hit.t;
-                   });
+        const auto shear = shear_of<kBlockSize, Isa>(ray);
+        if constexpr (query == Query::kAny) {
+            if (find_occluders(shear, ray, best_t_[lane], block) == 0) return;
+            best_.occlude(Mask<N, Isa>::from_bits(1u << lane));
+            best_t_[lane] = kNever;
+        } else {
+            meet_block(shear, ray, best_t_[lane], block, [&](const BlockHit& hit) {
+                best_.update(hit, instance_id_, 1u << lane);
+                best_t_[lane] = hit.t;
+            });
+        }
     }
 
     const TreeView& tree_;

@@ -262,16 +262,18 @@ private:
         }
         shear.shear_x = ray.shear_x;
         shear.shear_y = ray.shear_y;
-        meet_block(shear, rays.single(r), ray.best_t, block, [&](const BlockHit& hit) {
-            if constexpr (query == Query::kAny) {
-                stream.looking &= ~(RaySet{1} << r);
-            } else if (hit.t < ray.best_t || hit.prim_id < rays.hits.prim_id[r]) {
+        if constexpr (query == Query::kAny) {
+            if (find_occluders(shear, rays.single(r), ray.best_t, block) == 0) return;
+            stream.looking &= ~(RaySet{1} << r);
+        } else {
+            meet_block(shear, rays.single(r), ray.best_t, block, [&](const BlockHit& hit) {
+                if (!(hit.t < ray.best_t || hit.prim_id < rays.hits.prim_id[r])) return;
                 ray.best_t = rays.hits.t[r] = hit.t;
                 rays.hits.u[r] = hit.u;
                 rays.hits.v[r] = hit.v;
                 rays.hits.prim_id[r] = hit.prim_id;
-            }
-        });
+            });
+        }
     }
 
     const TreeView& tree_;

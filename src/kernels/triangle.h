@@ -78,12 +78,17 @@ PACKET_NOINLINE void decide_edges(const StoredCorners<N>& p, std::uint32_t bits,
 /// within the slack of boxes.) Decided from floats that are the same on every ISA.
 inline constexpr float kWorstCondition = 2.0f;
 
+/// |x| |y|.
+template <int N, class Isa>
+PACKET_INLINE Float<N, Isa> largest_area(const Float3<N, Isa> (&p)[3]) {
+    const Float<N, Isa> x = max(abs(p[0].x), max(abs(p[1].x), abs(p[2].x)));
+    const Float<N, Isa> y = max(abs(p[0].y), max(abs(p[1].y), abs(p[2].y)));
+    return x * y;
+}
 template <int N, class Isa>
 PACKET_INLINE Mask<N, Isa> is_ill_conditioned(const Float3<N, Isa> (&p)[3],
                                               const Float<N, Isa>& det) {
-    const Float<N, Isa> x = max(abs(p[0].x), max(abs(p[1].x), abs(p[2].x)));
-    const Float<N, Isa> y = max(abs(p[0].y), max(abs(p[1].y), abs(p[2].y)));
-    return abs(det) * Float<N, Isa>(kWorstCondition) < x * y;
+    return abs(det) * Float<N, Isa>(kWorstCondition) < largest_area(p);
 }
 
 /// t, u and v of the lanes in `bits`, in double from the sheared corners.
@@ -203,6 +208,39 @@ PACKET_INLINE Mask<N, Isa> decide_zeros(const Float3<N, Isa> (&p)[3], Mask<N, Is
                          ((e.u <= zero) & (e.v <= zero) & (e.w <= zero)));
 }
 
+/// Lanes of which decide_hits() need not be asked.
+template <int N, class Isa>
+struct Verdicts {
+    Mask<N, Isa> hit, miss;
+};
+
+/// Of lanes that may hit, those that surely do and those that surely do not, which most of them
+/// are: rays that start on a surface may hit the triangle that they start on, and others behind
+/// them or beyond best_t. docs/decisions/depth-margin.md shows that the margin holds.
+template <int N, class Isa, class Rays>
+PACKET_INLINE Verdicts<N, Isa> judge(const ShearedTriangles<N, Isa>& sheared, const Rays& ray,
+                                     const Float<N, Isa>& best_t) {
+    using F = Float<N, Isa>;
+    constexpr float kMargin = 0x1.8p-20f;
+    constexpr float kLeastDepth = 0x1p-20f, kLeastArea = 0x1p-80f;
+    constexpr float kGuard = 0x1p24f;  // where a product below overflows, the margin is no number
+    const Float3<N, Isa>(&p)[3] = sheared.corner;
+    const Edges<N, Isa>& e = sheared.edges;
+    const F per_area = F(1.0f) / (e.u + e.v + e.w);
+    const F t[3] = {ray.scale_z * p[0].z, ray.scale_z * p[1].z, ray.scale_z * p[2].z};
+    const F depth = (e.u * t[0] + e.v * t[1] + e.w * t[2]) * per_area;
+    const F farthest = max(abs(t[0]), max(abs(t[1]), abs(t[2])));
+    const F least_margin = farthest * F(kMargin) + F(kMargin * kLeastDepth);
+    const F area = largest_area(p) * F(kGuard) + F(kGuard * kLeastArea);
+    const F margin = area * least_margin * (abs(per_area) * F(1.0f / kGuard)) + least_margin;
+    const F earliest = depth - margin, latest = depth + margin;
+    // false for NaN, as all comparisons are
+    const Mask<N, Isa> inside =
+        (F(0.0f) < min(e.u, min(e.v, e.w))) | (max(e.u, max(e.v, e.w)) < F(0.0f));
+    return {inside & (ray.tnear <= earliest) & (latest <= best_t),
+            (latest < ray.tnear) | (best_t < earliest)};
+}
+
 /// Which of `candidates`, lanes that may hit, do: the ray passes inside or on the edges, the
 /// triangle's box is met, and t, moved into that box, lies in [tnear, best_t].
 template <int N, class Isa, class Rays, class Triangles>
@@ -258,6 +296,39 @@ PACKET_INLINE TriangleHits<N, Isa> meet_triangle(const PreparedRays<N, Isa>& ray
             decide_hits(sheared, part(ray.hit, i), part(best_t, i), candidates, triangle);
         out.hit.r[i] = hits.hit.r[0];
         out.t.r[i] = hits.t.r[0], out.u.r[i] = hits.u.r[0], out.v.r[i] = hits.v.r[0];
+    }
+    return out;
+}
+
+/// Which of `candidates` hit, all computed anew: rare, so that registers need not be kept for it.
+template <Directions directions, int N, class Isa>
+PACKET_NOINLINE std::uint32_t decide_part(const PreparedRays<N, Isa>& ray,
+                                          const Float<N, Isa>& best_t, std::uint32_t candidates,
+                                          const SameTriangle& triangle, int i) {
+    const auto sheared = shear<directions>(part(ray.shear, i), triangle);
+    const auto lanes = Mask<kPartSize<N, Isa>, Isa>::from_bits(candidates);
+    return decide_hits(sheared, part(ray.hit, i), part(best_t, i), lanes, triangle).hit.bits();
+}
+
+/// As meet_triangle(), for any-hit: which of the lanes hit.
+template <Directions directions, int N, class Isa>
+PACKET_INLINE Mask<N, Isa> find_occluded(const PreparedRays<N, Isa>& ray,
+                                         const Float<N, Isa>& best_t, Mask<N, Isa> active,
+                                         const SameTriangle& triangle) {
+    Mask<N, Isa> out;
+    for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
+        const auto sheared = shear<directions>(part(ray.shear, i), triangle);
+        const auto candidates = part(active, i) & sheared.may_hit();
+        out.r[i] = candidates.r[0];
+        if (none(candidates)) continue;
+        const auto verdicts = judge(sheared, part(ray.hit, i), part(best_t, i));
+        auto hit = candidates & verdicts.hit;
+        const auto undecided = candidates & ~(verdicts.hit | verdicts.miss);
+        if (any(undecided)) [[unlikely]] {
+            hit = hit | decltype(hit)::from_bits(
+                            decide_part<directions>(ray, best_t, undecided.bits(), triangle, i));
+        }
+        out.r[i] = hit.r[0];
     }
     return out;
 }
