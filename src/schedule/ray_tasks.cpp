@@ -6,8 +6,7 @@
 namespace packet {
 
 std::size_t rays_per_stream_task(std::size_t rays, int threads) noexcept {
-    constexpr std::size_t kMost = 32768;
-    static_assert(kMost <= StreamOrder::kMostRays);
+    constexpr std::size_t kMost = StreamOrder::kMostRays;
     constexpr std::size_t kTasksPerThread = 8;
     if (threads == 1) return kMost;
     return std::clamp(rays / (kTasksPerThread * static_cast<std::size_t>(threads)),

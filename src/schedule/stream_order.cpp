@@ -22,7 +22,7 @@ namespace {
 
 // What is sorted: a ray's class, its place on the curve and its index, in one word. Finer cells
 // than 16 along a side change nothing (docs/benchmarking.md#streams), and so two passes do.
-constexpr int kIndexBits = 15, kCellBits = 4, kClassBits = 5;
+constexpr int kIndexBits = 14, kCellBits = 4, kClassBits = 5;
 constexpr int kLowBits = 9, kHighBits = 8;
 constexpr int kHighShift = kIndexBits + kLowBits;
 static_assert(StreamOrder::kMostRays == std::size_t{1} << kIndexBits);

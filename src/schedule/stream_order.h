@@ -18,7 +18,7 @@ namespace packet {
 /// Sorts rays. Keeps its memory for the next time: new memory would cost as much as the sorting.
 class StreamOrder {
 public:
-    static constexpr std::size_t kMostRays = 32768;
+    static constexpr std::size_t kMostRays = 16384;
 
     /// The indices of `rays`, kMostRays at most, in that order, until the next call. O(n) time, 8
     /// bytes a ray.

@@ -10,7 +10,7 @@ namespace packet {
 namespace {
 
 // Fewer fill not much more than one task does.
-constexpr std::size_t kLeastRaysTogether = 4 * StreamOrder::kMostRays;
+constexpr std::size_t kLeastRaysTogether = 8 * StreamOrder::kMostRays;
 
 KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
