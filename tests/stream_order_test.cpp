@@ -77,7 +77,7 @@ TEST_CASE("many rays are sorted as few are, by any number of threads") {
 TEST_CASE("scattered rays, sorted together, get their own hits") {
     Scene scene = make_scene(tools::make_city(3000, 3));
     scene.commit();
-    const std::vector<Ray> rays = random_rays(scene.bounds(), 5 * StreamOrder::kMostRays + 7, 9);
+    const std::vector<Ray> rays = random_rays(scene.bounds(), 9 * StreamOrder::kMostRays + 7, 9);
     std::vector<Hit> want(rays.size()), got(rays.size());
     std::vector<std::uint8_t> occluded(rays.size());
     TraceOptions options;
@@ -131,7 +131,7 @@ TEST_CASE("streams that take steps in turn, in a tree beyond the cache, find the
 
 TEST_CASE("rays that follow each other start near each other") {
     const Bounds3f world{{0, 0, 0}, {1, 1, 1}};
-    std::vector<Ray> rays = random_rays(world, 20000, 6);
+    std::vector<Ray> rays = random_rays(world, StreamOrder::kMostRays, 6);
     for (Ray& ray : rays) ray.dir = {0, 0, 1};
     StreamOrder order;
     const auto sorted = order.sort(rays);
