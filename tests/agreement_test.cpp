@@ -81,6 +81,42 @@ TEST_CASE("rays at every vertex, edge and interior of a grid") {
     check_agreement(make_scene(mesh), rays, "grid");
 }
 
+TEST_CASE("rays that start or end ever farther away, or never end") {
+    Scene scene = make_scene(tools::make_sphere(1000));
+    const Bounds3f box = scene.bounds();
+    const float size = glm::length(box.extent());
+    const glm::vec3 middle = 0.5f * (box.lower + box.upper);
+    const glm::vec3 toward = glm::normalize(glm::vec3(0.3f, 0.9f, 0.21f));
+    const glm::vec3 side = glm::normalize(glm::cross(toward, glm::vec3(1.0f, 0.0f, 0.0f)));
+    const glm::vec3 up = glm::cross(side, toward);
+    std::vector<Ray> rays;
+    // Each 16 x 16 rays make a beam, whichever of its ends is the narrow one.
+    for (const float far : {0.5f, 3.0f, 10.0f, 1e2f, 1e3f, 1e4f, 1e6f, 1e10f, 1e20f, 1e29f}) {
+        for (int i = 0; i < 4 * 256; ++i) {
+            const float x = static_cast<float>(i % 16) / 16.0f - 0.5f;
+            const float y = static_cast<float>(i / 16 % 16) / 16.0f - 0.5f;
+            const glm::vec3 place = middle + 0.4f * size * (x * side + y * up);
+            Ray ray;
+            switch (i / 256) {
+                case 0:  // parallel, as to a sun
+                    ray.org = place, ray.dir = toward, ray.tfar = far;
+                    break;
+                case 1:  // to a light
+                    ray = aim(place, middle + far * size * toward), ray.tfar = 0.999f;
+                    break;
+                case 2:  // from an eye
+                    ray = aim(middle - far * size * toward, place);
+                    break;
+                default:  // through a point behind all
+                    ray.org = place, ray.dir = toward + 0.02f * (x * side + y * up);
+                    ray.tfar = far;
+            }
+            rays.push_back(ray);
+        }
+    }
+    check_agreement(scene, rays, "far ends");
+}
+
 TEST_CASE("rays in the planes of boxes, along axes, and starting on them") {
     TriangleMesh mesh = make_grid(8, 8, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
     const TriangleMesh wall = make_grid(8, 8, {0, 0, 0}, {0, 1, 0}, {0, 0, 1});

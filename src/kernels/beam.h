@@ -161,11 +161,15 @@ private:
     }
 
     /// Rays from an eye spread from their begin, rays to a light narrow to their end: the lines
-    /// start where the rays are closest. After the anchor it is the ray of least slope that is
-    /// lowest, before it that of greatest.
+    /// start where the rays are closest, unless that is so far away that rounding there exceeds the
+    /// margin. After the anchor it is the ray of least slope that is lowest, before it that of
+    /// greatest.
     PACKET_INLINE void anchor(BeamBounds& out, const float (&lowest)[2], const float (&highest)[2],
                               float begin, float sign) const {
-        const bool has_end = out.end < kFarthest;
+        // The margin is 64 ulp of the scene's reach at least, and a line's rounding 8 ulp of its
+        // way to the anchor and 6 of the reach: the way may be 4 times as long as the reach.
+        constexpr float kUlps = 16.0f / 16777216.0f;
+        const bool has_end = (out.end - begin * sign) * kUlps <= out.margin;  // false for inf, NaN
         const float plane[2] = {begin, has_end ? out.end * sign : begin};
         Crossing at[2];
         cross(plane, at);

@@ -19,10 +19,11 @@ struct GridRay {
     float start;                ///< where the march starts: at the grid, tnear or later
 
     /// Starts at `from` or later.
-    PACKET_INLINE GridRay(const GridView& grid, const SingleRay& ray, float from) {
+    PACKET_INLINE GridRay(const GridView& grid, const SingleRay& ray, float from)
+        : start(ray.number(PreparedLanes::kTnear) > from ? ray.number(PreparedLanes::kTnear)
+                                                         : from) {
         using L = PreparedLanes;
         std::int32_t step = 1;
-        start = ray.number(L::kTnear) > from ? ray.number(L::kTnear) : from;
         for (int a = 0; a < 3; ++a) {
             const int count = grid.brick_count[a];
             const bool negative = ray.is_backward(a);
