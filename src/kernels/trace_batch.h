@@ -137,6 +137,22 @@ PACKET_INLINE std::uint32_t mesh_of(const SceneView& scene, std::int32_t instanc
     return instance_id < 0 ? kInvalidId : scene.mesh_of_instance[instance_id];
 }
 
+/// The meshes of eight instances, to be read as one row. Where all are written as one, that need
+/// not wait for them.
+template <class Isa>
+PACKET_INLINE void meshes_of(const SceneView& scene, const std::int32_t* instance_id,
+                             std::int32_t (&out)[8]) {
+    using I = Int<8, Isa>;
+    if (scene.is_single_mesh) {
+        const auto mesh_id =
+            static_cast<std::int32_t>(scene.mesh_of_instance[scene.instances[0].instance_id]);
+        select(I::load(instance_id) < I(0), I(-1), I(mesh_id)).store(out);
+    } else {
+        for (int i = 0; i < 8; ++i)
+            out[i] = static_cast<std::int32_t>(mesh_of(scene, instance_id[i]));
+    }
+}
+
 /// Rays `begin` to `begin + lanes` of the batch, and where their results go.
 PACKET_INLINE std::size_t place(const TraceBatch& batch, std::size_t i) {
     return batch.order != nullptr ? batch.order[i] : i;
@@ -198,8 +214,8 @@ template <int kCount, class Isa>
 PACKET_INLINE void scatter_8_hits(const TraceBatch& batch, std::size_t begin,
                                   const HitArrays<kCount, Isa>& hits, int first) {
     static_assert(sizeof(Hit) == 6 * sizeof(float));
-    std::uint32_t mesh_id[8];
-    for (int i = 0; i < 8; ++i) mesh_id[i] = mesh_of(*batch.scene, hits.instance_id[first + i]);
+    std::int32_t mesh_id[8];
+    meshes_of<Isa>(*batch.scene, hits.instance_id + first, mesh_id);
     const Floats8 instances = *as_row(hits.instance_id + first);
     Floats8 rows[8] = {*as_row(hits.t + first),
                        *as_row(hits.u + first),

@@ -18,9 +18,12 @@ PACKET_INLINE const UnalignedFloats8* as_row(const void* numbers) {
 PACKET_INLINE UnalignedFloats8* as_row(void* numbers) {
     return static_cast<UnalignedFloats8*>(numbers);
 }
-/// Stores the first six.
+/// Stores the first six out of the register: a copy of six would go by the stack.
 PACKET_INLINE void store6(void* to, const Floats8& row) {
-    __builtin_memcpy(to, &row, 6 * sizeof(float));
+    using Four [[gnu::vector_size(16), gnu::aligned(4), gnu::may_alias]] = float;
+    using Two [[gnu::vector_size(8), gnu::aligned(4), gnu::may_alias]] = float;
+    *static_cast<Four*>(to) = __builtin_shufflevector(row, row, 0, 1, 2, 3);
+    *reinterpret_cast<Two*>(static_cast<float*>(to) + 4) = __builtin_shufflevector(row, row, 4, 5);
 }
 
 /// Transposes 8 x 8: pairs within quarters, quarters within halves, then the halves.

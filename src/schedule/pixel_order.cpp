@@ -36,6 +36,15 @@ std::size_t PixelOrder::fill(std::size_t tile, Indices& out) const noexcept {
     for (std::size_t square = 0; square < kSquares * kSquares; ++square) {
         const std::size_t x0 = x_begin + even_bits(square) * kSquareSize;
         const std::size_t y0 = even_bits(square >> 1) * kSquareSize;
+        const std::size_t first = y0 * width_ + x0;
+        const std::size_t last = first + (kSquareSize - 1) * (width_ + 1);
+        if (x0 + kSquareSize <= x_end && last < rays_left) {
+            for (std::size_t i = 0; i < kSquareSize * kSquareSize; ++i) {
+                out[filled++] =
+                    static_cast<std::uint32_t>(first + i / kSquareSize * width_ + i % kSquareSize);
+            }
+            continue;
+        }
         for (std::size_t y = y0; y < y0 + kSquareSize; ++y) {
             for (std::size_t x = x0; x < std::min(x0 + kSquareSize, x_end); ++x) {
                 const std::size_t ray = y * width_ + x;
