@@ -45,6 +45,16 @@ TEST_CASE("four tries that leave little doubt end it for packets, whatever cheap
     CHECK(tries.best() == KernelTable::kPacket16);
 }
 
+TEST_CASE("four tries that leave little doubt end it for the other kernel") {
+    PacketTries tries(KernelTable::kTile, 0.95);
+    for (int i = 0; i < 4; ++i) {
+        CHECK(tries.is_open());
+        tries.add({1.0, 1.15});
+    }
+    CHECK_FALSE(tries.is_open());
+    CHECK(tries.best() == KernelTable::kTile);
+}
+
 TEST_CASE("one interrupted task among four is no proof") {
     PacketTries tries(KernelTable::kTile, 0.95);
     tries.add({100.0, 1.0});

@@ -1,5 +1,5 @@
 // Whether packets of 16 are faster than the kernel that was planned: found out by tracing some
-// tasks both ways, while threads trace the others.
+// rays both ways, while threads trace the others.
 #pragma once
 
 #include "kernels/kernel_table.h"
@@ -15,8 +15,8 @@ namespace packet {
 
 class PacketTries {
 public:
-    static constexpr std::size_t kCount = 9;
-    /// Seconds that a task took each way.
+    static constexpr std::size_t kCount = 7;
+    /// Seconds that the same rays took each way.
     struct Try {
         double planned = 0.0, packets = 0.0;
     };
@@ -31,22 +31,24 @@ public:
     [[nodiscard]] KernelTable::Kernel best() const noexcept { return best_; }
 
     /// Thread-safe. Two tries in a row without any hope for packets are enough, or a few that leave
-    /// little doubt of them, or kCount.
+    /// little doubt, or kCount.
     void add(const Try& made) {
         const std::scoped_lock lock(mutex_);
         if (!is_open_) return;
         tries_[made_++] = made;
         const bool is_full = made_ == kCount;
-        const bool are_faster = made_ >= kFewest && ratio() < (is_full ? packets_below_ : kClearly);
+        const bool are_few = made_ < kFewest;
+        const bool are_faster = !are_few && ratio() < (is_full ? packets_below_ : kClearlyFaster);
+        const bool are_slower = !are_few && ratio() > kClearlySlower;
         const bool are_hopeless =
             made_ >= 2 && is_hopeless(tries_[made_ - 1]) && is_hopeless(tries_[made_ - 2]);
         if (are_faster) best_ = KernelTable::kPacket16;
-        if (is_full || are_faster || are_hopeless) is_open_ = false;
+        if (is_full || are_faster || are_slower || are_hopeless) is_open_ = false;
     }
 
 private:
     static constexpr std::size_t kFewest = 4;
-    static constexpr double kClearly = 0.85;
+    static constexpr double kClearlyFaster = 0.85, kClearlySlower = 1.1;
 
     [[nodiscard]] static bool is_hopeless(const Try& t) { return t.packets > 1.25 * t.planned; }
     /// The time of packets so far, in units of the other's. Without the two tries that speak most

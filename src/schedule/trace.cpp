@@ -20,11 +20,10 @@ namespace packet {
 
 namespace {
 
-// Packets are tried if that is so little of the whole that the slower tasks do not count: mostly
-// those of two tries.
+// Packets are tried if that is little of the whole: 4 times the rays of a try for each, of tasks of
+// 512 rays or more.
 constexpr std::size_t kLeastTasksForTries = 128;
-// A try takes some neighbouring tasks.
-constexpr std::size_t kTasksOfTry = 4;
+constexpr std::size_t kRaysOfTry = 128;
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
 class SpanTrace {
@@ -121,35 +120,32 @@ private:
         return tasks_.count() / PacketTries::kCount;
     }
     [[nodiscard]] bool is_of_try(std::size_t task) const {
-        return tries_ && task % stride_of_tries() < kTasksOfTry &&
+        return tries_ && task % stride_of_tries() == 0 &&
                task / stride_of_tries() < PacketTries::kCount;
     }
 
-    /// Traces the tasks of a try: two by the planned kernel and two by packets, if it is not known
-    /// yet what is faster. Their hits are as good as any.
+    /// Traces the task of a try, and if it is not known yet what is faster, the first of its rays
+    /// again both ways, which give the same hits. Other rays, though neighbours, tell nothing: one
+    /// task may be a tree, and the next one the sky.
     template <class KernelOf>
-    void make_try(std::size_t i, const KernelOf& kernel, const TraceBatch& batch,
+    void make_try(std::size_t i, const KernelOf& kernel, TraceBatch batch,
                   PacketTries& tries) const {
         // The first two are of different halves, and so on: an image's upper half may be the sky.
-        const std::size_t place = (5 * i + 6) % PacketTries::kCount;
-        std::size_t task = place * stride_of_tries();
-        if (!tries.is_open()) {
-            const KernelTable::Batch best = kernel(tries.best());
-            for (std::size_t k = 0; k < kTasksOfTry; ++k) run_task(task + k, best, batch);
-            return;
-        }
-        // Of two tasks the first finds the rays' part of the scene, the kernel's code and its
-        // branches out of the caches, and does not count.
-        const auto second_of_two = [&](KernelTable::Kernel which) {
-            run_task(task++, kernel(which), batch);
+        const std::size_t place = (4 * i + 5) % PacketTries::kCount;
+        const std::size_t task = place * stride_of_tries();
+        run_task(task, kernel(tries.best()), batch);
+        if (!tries.is_open()) return;
+        TraceStats not_counted;
+        batch.stats = options_.stats != nullptr ? &not_counted : nullptr;
+        const auto time = [&](KernelTable::Kernel which) {
             const auto start = std::chrono::steady_clock::now();
-            run_task(task++, kernel(which), batch);
+            tasks_.run(task, kernel(which), batch, kRaysOfTry);
             return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         };
-        PacketTries::Try made;
-        if (i % 2 == 0) made.planned = second_of_two(plan_.kernel);
-        made.packets = second_of_two(KernelTable::kPacket16);
-        if (i % 2 != 0) made.planned = second_of_two(plan_.kernel);
+        // The first time finds a kernel's code and its branches out of the caches.
+        PacketTries::Try made{time(plan_.kernel), time(KernelTable::kPacket16)};
+        made.planned = std::min(made.planned, time(plan_.kernel));
+        made.packets = std::min(made.packets, time(KernelTable::kPacket16));
         tries.add(made);
     }
 
