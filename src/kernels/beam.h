@@ -23,6 +23,7 @@ struct BeamBounds {
     float slope[2][kBeamSides];   ///< of x and y over z: the lines that bound them lower and upper
     float offset[2][kBeamSides];  ///< x and y where these lines cross z = anchor
     float anchor;                 ///< no ray begins before it, or none goes on behind it
+    float away;                   ///< the sign of z - anchor where rays are
     float begin, end;             ///< of the rays, along z times its direction
     float margin;                 ///< what rounding may come to, amply
     bool is_sound;                ///< no ray looks back, and all numbers are finite
@@ -176,6 +177,7 @@ private:
         const bool is_after = !(has_end && at[1].spread() < at[0].spread());
         const Crossing& crossing = at[is_after ? 0 : 1];
         out.anchor = plane[is_after ? 0 : 1];
+        out.away = is_after ? sign : -sign;
         const int lower = is_after == (sign > 0.0f) ? kLower : kUpper;
         for (int a = 0; a < 2; ++a) {
             out.slope[a][lower] = lowest[a];

@@ -15,6 +15,9 @@ struct BestHits {
     using F = Float<N, Isa>;
     using I = Int<N, Isa>;
     using M = Mask<N, Isa>;
+    using PartFloat = Float<kPartSize<N, Isa>, Isa>;
+    using PartInt = Int<kPartSize<N, Isa>, Isa>;
+    using PartMask = Mask<kPartSize<N, Isa>, Isa>;
 
     /// Farther than this nothing counts. kNever in lanes that take no part, or no longer do: then
     /// no comparison with it holds, and no other mask is needed.
@@ -36,32 +39,35 @@ struct BestHits {
     PACKET_INLINE void enter_instance(std::int32_t id) {
         tie_prim_id = select(I(id) < instance_id, I(kNoId), I(-1));
     }
-    /// For any-hit, where no more is asked than that there is one: lanes that need look no further.
-    PACKET_INLINE void occlude(M hit) {
-        t = select(hit, F(kNever), t);
-        prim_id = select(hit, I(0), prim_id);
+    /// For any-hit, where no more is asked than that there is one: lanes of register i that need
+    /// look no further.
+    PACKET_INLINE void occlude(int i, PartMask hit) {
+        assign_part(t, i, hit, PartFloat(kNever));
+        assign_part(prim_id, i, hit, PartInt(0));
     }
-    /// `hit` lanes have new_t <= t.
-    template <Query query>
-    PACKET_INLINE void update(M hit, const F& new_t, const F& new_u, const F& new_v,
-                              const I& new_prim_id, std::int32_t instance) {
-        if constexpr (query == Query::kAny) {
-            occlude(hit);
-        } else {
-            // if (new_t < t || new_prim_id < tie_prim_id) take it
-            const M closer = hit & ((new_t < t) | (new_prim_id < tie_prim_id));
-            t = select(closer, new_t, t);
-            u = select(closer, new_u, u);
-            v = select(closer, new_v, v);
-            prim_id = select(closer, new_prim_id, prim_id);
-            tie_prim_id = select(closer, new_prim_id, tie_prim_id);
-            instance_id = select(closer, I(instance), instance_id);
-        }
+    /// Hits of lanes of register i, none of them behind t.
+    PACKET_INLINE void update(int i, PartMask hit, const PartFloat& new_t, const PartFloat& new_u,
+                              const PartFloat& new_v, const PartInt& new_prim_id,
+                              std::int32_t instance) {
+        // if (new_t < t || new_prim_id < tie_prim_id) take it
+        const PartMask closer = hit & ((new_t < part(t, i)) | (new_prim_id < part(tie_prim_id, i)));
+        assign_part(t, i, closer, new_t);
+        assign_part(u, i, closer, new_u);
+        assign_part(v, i, closer, new_v);
+        assign_part(prim_id, i, closer, new_prim_id);
+        assign_part(tie_prim_id, i, closer, new_prim_id);
+        assign_part(instance_id, i, closer, PartInt(instance));
     }
     /// A hit of one lane.
     template <class Hit>
-    PACKET_INLINE void update(const Hit& hit, std::int32_t instance, std::uint32_t lane_bit = 1) {
-        update<Query::kClosest>(M::from_bits(lane_bit), hit.t, hit.u, hit.v, hit.prim_id, instance);
+    PACKET_INLINE void update(const Hit& hit, std::int32_t instance, int lane = 0) {
+        constexpr int kSize = kPartSize<N, Isa>;
+        update(lane / kSize, PartMask::from_bits(1u << lane % kSize), hit.t, hit.u, hit.v,
+               hit.prim_id, instance);
+    }
+    PACKET_INLINE void occlude(int lane) {
+        constexpr int kSize = kPartSize<N, Isa>;
+        occlude(lane / kSize, PartMask::from_bits(1u << lane % kSize));
     }
     PACKET_INLINE M found() const { return prim_id < I(kNoId); }
 };

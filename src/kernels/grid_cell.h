@@ -84,12 +84,12 @@ template <Query query, Directions directions, int N, class Isa, class Stats>
                                   std::uint32_t first, std::uint32_t item_count, int lane_count,
                                   std::int32_t instance_id, Mailbox<Isa>& mailbox,
                                   BestHits<N, Isa>& best, Stats& stats) {
-    const PacketLeaf<query, directions, N, Isa> leaf{tree, ray, instance_id, best};
+    const PacketLeaf<query, directions, N, Isa> leaf{ray, ray.shear.axis, instance_id, best};
     for (std::uint32_t i = first; i < first + item_count; ++i) {
         const TriangleBlock& block = tree.blocks[i / kBlockSize];
         if (mailbox.knows(block.prim_id[i % kBlockSize])) continue;
         stats.triangles(lane_count);
-        leaf.meet(block, 1u << i % kBlockSize, best.t > Float<N, Isa>(kNever));
+        leaf.meet(block, static_cast<int>(i % kBlockSize), best.t > Float<N, Isa>(kNever));
     }
 }
 

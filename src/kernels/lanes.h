@@ -192,10 +192,22 @@ PACKET_INLINE Float<kPartSize<N, Isa>, Isa> part(const Float<N, Isa>& lanes, int
     return out;
 }
 template <int N, class Isa>
+PACKET_INLINE Int<kPartSize<N, Isa>, Isa> part(const Int<N, Isa>& lanes, int i) {
+    Int<kPartSize<N, Isa>, Isa> out;
+    out.r[0] = lanes.r[i];
+    return out;
+}
+template <int N, class Isa>
 PACKET_INLINE Mask<kPartSize<N, Isa>, Isa> part(const Mask<N, Isa>& lanes, int i) {
     Mask<kPartSize<N, Isa>, Isa> out;
     out.r[0] = lanes.r[i];
     return out;
+}
+
+/// The lanes of `m` in register i become those of `values`.
+template <class Lanes, int N, class Isa, class Part>
+PACKET_INLINE void assign_part(Lanes& lanes, int i, Mask<N, Isa> m, const Part& values) {
+    lanes.r[i] = select(m, values, part(lanes, i)).r[0];
 }
 
 /// Three floats a lane.

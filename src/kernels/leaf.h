@@ -1,5 +1,4 @@
-// What happens at a leaf of a mesh's tree: many rays meet its triangles one by one, a single ray
-// meets eight at once.
+// What happens at a leaf of a mesh's tree: many rays meet a triangle, a single ray meets eight.
 #pragma once
 
 #include "kernels/best_hit.h"
@@ -23,33 +22,24 @@ struct BlockRange {
     }
 };
 
-/// A packet meets triangles one by one, each broadcast to all lanes.
+/// A packet meets a triangle, broadcast to all lanes.
 template <Query query, Directions directions, int N, class Isa>
 struct PacketLeaf {
-    const TreeView& tree;
     const PreparedRays<N, Isa>& ray;
+    const int (&axis)[3];  ///< of the shear: for all packets of a tile the same
     std::int32_t instance_id;
     BestHits<N, Isa>& best;
 
-    PACKET_INLINE void meet(BlockRange range, Mask<N, Isa> active) const {
-        for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            meet(tree.blocks[b], range.lanes(b), active);
-        }
-    }
-    /// The triangles of `lanes` in a block.
-    PACKET_INLINE void meet(const TriangleBlock& block, std::uint32_t lanes,
-                            Mask<N, Isa> active) const {
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const int lane = __builtin_ctz(lanes);
-            const SameTriangle triangle{block, lane};
+    /// The triangle of one lane of a block.
+    PACKET_INLINE void meet(const TriangleBlock& block, int lane, Mask<N, Isa> active) const {
+        const SameTriangle triangle{block, lane};
+        for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
             if constexpr (query == Query::kAny) {
-                best.occlude(find_occluded<directions>(ray, best.t, active, triangle));
+                best.occlude(i, find_occluded<directions>(ray, axis, best.t, active, triangle, i));
             } else {
-                const TriangleHits<N, Isa> hits =
-                    meet_triangle<directions>(ray, best.t, active, triangle);
+                const auto hits = meet_triangle<directions>(ray, axis, best.t, active, triangle, i);
                 if (none(hits.hit)) continue;
-                best.template update<query>(hits.hit, hits.t, hits.u, hits.v,
-                                            Int<N, Isa>(block.prim_id[lane]), instance_id);
+                best.update(i, hits.hit, hits.t, hits.u, hits.v, block.prim_id[lane], instance_id);
             }
         }
     }
@@ -133,7 +123,7 @@ struct SingleLeaf {
             const auto shear = shear_of<kBlockSize, Isa>(opaque(ray));
             if constexpr (query == Query::kAny) {
                 if (find_occluders(shear, ray, best.t.r[0], tree.blocks[b]) == 0) continue;
-                best.occlude(Mask<1, Isa>::from_bits(1));
+                best.occlude(0);
                 return;
             } else {
                 meet_block(shear, ray, best.t.r[0], tree.blocks[b],

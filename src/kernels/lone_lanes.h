@@ -54,11 +54,11 @@ private:
         const auto shear = shear_of<kBlockSize, Isa>(ray);
         if constexpr (query == Query::kAny) {
             if (find_occluders(shear, ray, best_t_[lane], block) == 0) return;
-            best_.occlude(Mask<N, Isa>::from_bits(1u << lane));
+            best_.occlude(lane);
             best_t_[lane] = kNever;
         } else {
             meet_block(shear, ray, best_t_[lane], block, [&](const BlockHit& hit) {
-                best_.update(hit, instance_id_, 1u << lane);
+                best_.update(hit, instance_id_, lane);
                 best_t_[lane] = hit.t;
             });
         }

@@ -43,15 +43,18 @@ private:
     }
     template <class BeamOrNone>
     PACKET_INLINE void meet_leaf(BlockRange range, Mask<N, Isa> active, const BeamOrNone& beam) {
-        const PacketLeaf<query, directions, N, Isa> leaf{tree_, prepared_, instance_id_, best_};
+        const PacketLeaf<query, directions, N, Isa> leaf{prepared_, prepared_.shear.axis,
+                                                         instance_id_, best_};
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
             const TriangleBlock& block = tree_.blocks[b];
-            const std::uint32_t triangles = range.lanes(b) & beam.meets(block);
+            std::uint32_t triangles = range.lanes(b) & beam.meets(block);
             stats_.triangles(count(active) * __builtin_popcount(triangles));
             if (count(active) < __builtin_popcount(triangles)) {
                 lone_lanes().meet(block, active);
-            } else {
-                leaf.meet(block, triangles, active);
+                continue;
+            }
+            for (; triangles != 0; triangles &= triangles - 1) {
+                leaf.meet(block, __builtin_ctz(triangles), active);
             }
         }
     }

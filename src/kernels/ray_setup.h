@@ -62,13 +62,13 @@ struct PreparedRays {
     HitRays<N, Isa> hit;
 };
 
-/// What the triangle test needs of one register's lanes.
+/// What the triangle test needs of one register's lanes, `axis` being ray.axis.
 template <int N, class Isa>
-PACKET_INLINE auto part(const ShearRays<N, Isa>& ray, int i) {
+PACKET_INLINE auto part(const ShearRays<N, Isa>& ray, const int (&axis)[3], int i) {
     ShearRays<kPartSize<N, Isa>, Isa> out;
     for (int a = 0; a < 3; ++a) {
         out.org[a] = part(ray.org[a], i);
-        out.axis[a] = ray.axis[a];
+        out.axis[a] = axis[a];
     }
     out.shear_x = part(ray.shear_x, i);
     out.shear_y = part(ray.shear_y, i);

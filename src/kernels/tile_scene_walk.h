@@ -57,8 +57,8 @@ private:
         const float length = bounds.end - bounds.begin;
         const bool is_narrow = bounds.width(length < way ? length : way) <= kWidestBeam * way;
         if (!bounds.is_sound || !is_narrow) return false;
-        TileWalk<query, N, Isa, Stats> walk(tree, rays + first, best + first, bounds, instance_id,
-                                            use, stats);
+        TileWalk<query, N, Isa, Stats> walk(tree, rays + first, best + first, last - first, bounds,
+                                            instance_id, use, stats);
         const std::uint32_t all = (1u << (last - first)) - 1;
         walk.run(active >> first & all);
         return true;

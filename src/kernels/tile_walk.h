@@ -10,6 +10,7 @@
 #include "kernels/beam.h"
 #include "kernels/box.h"
 #include "kernels/lone_lanes.h"
+#include "kernels/packet_slopes.h"
 #include "kernels/prefetch.h"
 
 namespace packet {
@@ -45,16 +46,20 @@ public:
     using M = Mask<N, Isa>;
 
     PACKET_INLINE TileWalk(const TreeView& tree, const PreparedRays<N, Isa>* rays,
-                           BestHits<N, Isa>* best, const BeamBounds& bounds,
+                           BestHits<N, Isa>* best, int packet_count, const BeamBounds& bounds,
                            std::int32_t instance_id, TileUse& use, Stats& stats)
         : tree_(tree),
           rays_(rays),
           best_(best),
           beam_(bounds),
+          slopes_(bounds, rays, best, packet_count),
           instance_id_(instance_id),
           use_(use),
           stats_(stats) {
-        for (int a = 0; a < 3; ++a) near_side_[a] = rays[0].near_side[a];
+        for (int a = 0; a < 3; ++a) {
+            near_side_[a] = rays[0].near_side[a];
+            axis_[a] = bounds.axis[a];
+        }
     }
 
     PACKET_INLINE void run(std::uint32_t packets) {
@@ -145,25 +150,41 @@ private:
 
     PACKET_INLINE void meet_leaf(BlockRange range, std::uint32_t packets) {
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            const TriangleBlock& block = tree_.blocks[b];
-            const std::uint32_t triangles = range.lanes(b) & beam_.meets(block);
-            if (triangles == 0) continue;
-            for (std::uint32_t left = packets; left != 0; left &= left - 1) {
-                const int p = __builtin_ctz(left);
-                stats_.triangles(count(active_[p]) * __builtin_popcount(triangles));
-                if (count(active_[p]) < __builtin_popcount(triangles)) {
-                    meet_by_rays(block, p);
-                    continue;
-                }
-                const PacketLeaf<query, Directions::kShared, N, Isa> leaf{tree_, rays_[p],
-                                                                          instance_id_, best_[p]};
-                leaf.meet(block, triangles, active_[p]);
-            }
+            meet_block(tree_.blocks[b], range.lanes(b), packets);
         }
         if constexpr (query == Query::kAny) {
             for (std::uint32_t left = packets; left != 0; left &= left - 1) {
                 const int p = __builtin_ctz(left);
                 if (none(best_[p].t > F(kNever))) looking_ &= ~(1u << p);
+            }
+        }
+    }
+    PACKET_INLINE void meet_block(const TriangleBlock& block, std::uint32_t lanes,
+                                  std::uint32_t packets) {
+        const TriangleSlopes<Isa> to = slopes_.to(block);
+        lanes &= slopes_.meets(to);
+        if ((lanes & to.open.bits()) != 0) [[unlikely]]
+            lanes &= beam_.meets(block);
+        if (lanes == 0) return;
+        // Pairs of packet and triangle, eight packets to a word: one loop over all of them ends
+        // once, where loops over each packet's triangles end when nobody can guess.
+        std::uint64_t pairs[kTilePackets<N> / 8] = {};
+        std::uint32_t by_rays = 0;
+        for (std::uint32_t left = packets; left != 0; left &= left - 1) {
+            const int p = __builtin_ctz(left);
+            const std::uint32_t triangles = lanes & slopes_.meets(to, p);
+            stats_.triangles(count(active_[p]) * __builtin_popcount(triangles));
+            const std::uint64_t is_few = count(active_[p]) < __builtin_popcount(triangles) ? 1 : 0;
+            pairs[p / 8] |= (triangles & (is_few - 1)) << 8 * (p % 8);
+            by_rays |= static_cast<std::uint32_t>(is_few) << p;
+        }
+        for (; by_rays != 0; by_rays &= by_rays - 1) meet_by_rays(block, __builtin_ctz(by_rays));
+        for (int word = 0; word < kTilePackets<N> / 8; ++word) {
+            for (std::uint64_t left = pairs[word]; left != 0; left &= left - 1) {
+                const int pair = __builtin_ctzll(left), p = 8 * word + pair / 8;
+                const PacketLeaf<query, Directions::kShared, N, Isa> leaf{rays_[p], axis_,
+                                                                          instance_id_, best_[p]};
+                leaf.meet(block, pair % 8, active_[p]);
             }
         }
     }
@@ -181,7 +202,8 @@ private:
     const PreparedRays<N, Isa>* rays_;
     BestHits<N, Isa>* best_;
     Beam<Isa> beam_;
-    int near_side_[3];
+    PacketSlopes<kTilePackets<N>, Isa> slopes_;
+    int near_side_[3], axis_[3];  ///< of all
     std::int32_t instance_id_;
     TileUse& use_;  ///< counted for any-hit
     Stats& stats_;

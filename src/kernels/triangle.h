@@ -281,23 +281,15 @@ PACKET_INLINE TriangleHits<N, Isa> decide_hits(const ShearedTriangles<N, Isa>& s
     return out;
 }
 
-/// The hits of the `active` lanes, one register of them at a time.
+/// The hits of the `active` lanes of register i.
 template <Directions directions, int N, class Isa>
-PACKET_INLINE TriangleHits<N, Isa> meet_triangle(const PreparedRays<N, Isa>& ray,
-                                                 const Float<N, Isa>& best_t, Mask<N, Isa> active,
-                                                 const SameTriangle& triangle) {
-    TriangleHits<N, Isa> out;
-    for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
-        const auto sheared = shear<directions>(part(ray.shear, i), triangle);
-        const auto candidates = part(active, i) & sheared.may_hit();
-        out.hit.r[i] = candidates.r[0];
-        if (none(candidates)) continue;
-        const auto hits =
-            decide_hits(sheared, part(ray.hit, i), part(best_t, i), candidates, triangle);
-        out.hit.r[i] = hits.hit.r[0];
-        out.t.r[i] = hits.t.r[0], out.u.r[i] = hits.u.r[0], out.v.r[i] = hits.v.r[0];
-    }
-    return out;
+PACKET_INLINE TriangleHits<kPartSize<N, Isa>, Isa> meet_triangle(
+    const PreparedRays<N, Isa>& ray, const int (&axis)[3], const Float<N, Isa>& best_t,
+    Mask<N, Isa> active, const SameTriangle& triangle, int i) {
+    const auto sheared = shear<directions>(part(ray.shear, axis, i), triangle);
+    const auto candidates = part(active, i) & sheared.may_hit();
+    if (none(candidates)) return {candidates, {}, {}, {}};
+    return decide_hits(sheared, part(ray.hit, i), part(best_t, i), candidates, triangle);
 }
 
 /// Which of `candidates` hit, all computed anew: rare, so that registers need not be kept for it.
@@ -305,32 +297,28 @@ template <Directions directions, int N, class Isa>
 PACKET_NOINLINE std::uint32_t decide_part(const PreparedRays<N, Isa>& ray,
                                           const Float<N, Isa>& best_t, std::uint32_t candidates,
                                           const SameTriangle& triangle, int i) {
-    const auto sheared = shear<directions>(part(ray.shear, i), triangle);
+    const auto sheared = shear<directions>(part(ray.shear, ray.shear.axis, i), triangle);
     const auto lanes = Mask<kPartSize<N, Isa>, Isa>::from_bits(candidates);
     return decide_hits(sheared, part(ray.hit, i), part(best_t, i), lanes, triangle).hit.bits();
 }
 
 /// As meet_triangle(), for any-hit: which of the lanes hit.
 template <Directions directions, int N, class Isa>
-PACKET_INLINE Mask<N, Isa> find_occluded(const PreparedRays<N, Isa>& ray,
-                                         const Float<N, Isa>& best_t, Mask<N, Isa> active,
-                                         const SameTriangle& triangle) {
-    Mask<N, Isa> out;
-    for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
-        const auto sheared = shear<directions>(part(ray.shear, i), triangle);
-        const auto candidates = part(active, i) & sheared.may_hit();
-        out.r[i] = candidates.r[0];
-        if (none(candidates)) continue;
-        const auto verdicts = judge(sheared, part(ray.hit, i), part(best_t, i));
-        auto hit = candidates & verdicts.hit;
-        const auto undecided = candidates & ~(verdicts.hit | verdicts.miss);
-        if (any(undecided)) [[unlikely]] {
-            hit = hit | decltype(hit)::from_bits(
-                            decide_part<directions>(ray, best_t, undecided.bits(), triangle, i));
-        }
-        out.r[i] = hit.r[0];
-    }
-    return out;
+PACKET_INLINE Mask<kPartSize<N, Isa>, Isa> find_occluded(const PreparedRays<N, Isa>& ray,
+                                                         const int (&axis)[3],
+                                                         const Float<N, Isa>& best_t,
+                                                         Mask<N, Isa> active,
+                                                         const SameTriangle& triangle, int i) {
+    const auto sheared = shear<directions>(part(ray.shear, axis, i), triangle);
+    const auto candidates = part(active, i) & sheared.may_hit();
+    if (none(candidates)) return candidates;
+    const auto verdicts = judge(sheared, part(ray.hit, i), part(best_t, i));
+    const auto hit = candidates & verdicts.hit;
+    const auto undecided = candidates & ~(verdicts.hit | verdicts.miss);
+    if (none(undecided)) [[likely]]
+        return hit;
+    return hit | Mask<kPartSize<N, Isa>, Isa>::from_bits(
+                     decide_part<directions>(ray, best_t, undecided.bits(), triangle, i));
 }
 
 }  // namespace packet
