@@ -185,9 +185,8 @@ void sort_many(std::span<const Ray> rays, std::span<std::uint32_t> out, std::uin
                          items[begin + i] = {key, first + static_cast<std::uint32_t>(begin + i)};
                      });
     });
-    const std::span<const Item> sorted =
-        radix_sort(std::span<Item>(items), std::span<Item>(scratch), kKeyBits, parallel,
-                   [](const Item& item) { return item.key; });
+    const std::span<const Item> sorted = radix_sort<Item, kLowBits>(
+        items, scratch, kKeyBits, parallel, [](const Item& item) { return item.key; });
     parallel.for_pieces(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) out[i] = sorted[i].index;
     });
