@@ -18,8 +18,9 @@ struct Probe {
                                                               int lane) {
         std::uint32_t bits = 0;
         const TriangleBlock* triangles = &block;
-        for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {  // as meet_triangle() does
-            const auto sheared = shear<directions>(part(ray, i), SameTriangle{*triangles, lane});
+        for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {  // as PacketLeaf does
+            const auto sheared =
+                shear<directions>(part(ray, ray.axis, i), SameTriangle{*triangles, lane});
             bits |= sheared.may_hit().bits() << i * kPartSize<N, Isa>;
             asm("" : "+r"(triangles), "+r"(bits));  // stands for the branch to decide_hits()
         }
@@ -27,11 +28,9 @@ struct Probe {
     }
     [[gnu::noinline]] static void rays_hit_triangle(const PreparedRays<N, Isa>& ray,
                                                     const TriangleBlock& block, int lane,
-                                                    const Float<N, Isa>& best_t,
-                                                    std::uint32_t active,
-                                                    TriangleHits<N, Isa>& out) {
-        out = meet_triangle<directions>(ray, best_t, Mask<N, Isa>::from_bits(active),
-                                        SameTriangle{block, lane});
+                                                    std::uint32_t active, BestHits<N, Isa>& best) {
+        const PacketLeaf<Query::kClosest, directions, N, Isa> leaf{ray, ray.shear.axis, 0, best};
+        leaf.meet(block, lane, Mask<N, Isa>::from_bits(active));
     }
 };
 

@@ -84,8 +84,11 @@ std::uint64_t packets_meet_triangles(const StepInput& in) {
             const SameTriangle triangle{in.tree.blocks[i / kBlockSize],
                                         static_cast<int>(i % kBlockSize)};
             const Mask<N, Isa> all = best_t > Float<N, Isa>(kNever);
-            met += static_cast<std::uint64_t>(
-                count(meet_triangle<directions>(rays, best_t, all, triangle).hit));
+            for (int part = 0; part < LanesOf<N, Isa>::kRegisters; ++part) {
+                met += static_cast<std::uint64_t>(count(
+                    meet_triangle<directions>(rays, rays.shear.axis, best_t, all, triangle, part)
+                        .hit));
+            }
         }
     });
     return met;

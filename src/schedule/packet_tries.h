@@ -54,13 +54,14 @@ private:
     /// The time of packets so far, in units of the other's. Without the two tries that speak most
     /// for either, for the system may have interrupted them.
     [[nodiscard]] double ratio() const {
-        std::array<Try, kCount> sorted = tries_;
-        const std::span made = std::span(sorted).first(made_);
-        std::ranges::sort(made, {}, [](const Try& t) { return t.planned - t.packets; });
+        const std::span made = std::span(tries_).first(made_);
+        const auto [least, most] = std::ranges::minmax_element(
+            made, {}, [](const Try& t) { return t.planned - t.packets; });
         Try sum;
-        for (const Try& t : made.subspan(1, made_ - 2)) {
-            sum.planned += t.planned;
-            sum.packets += t.packets;
+        for (auto t = made.begin(); t != made.end(); ++t) {
+            if (t == least || t == most) continue;
+            sum.planned += t->planned;
+            sum.packets += t->packets;
         }
         return sum.packets / sum.planned;
     }
