@@ -80,13 +80,17 @@ template <Directions directions, int N, class Isa>
 std::uint64_t packets_meet_triangles(const StepInput& in) {
     std::uint64_t met = 0;
     for_each_packet<N, Isa>(in, [&](const PreparedRays<N, Isa>& rays, Float<N, Isa> best_t) {
-        for (std::size_t i = 0; i < in.block_count * kBlockSize; ++i) {
-            const SameTriangle triangle{in.tree.blocks[i / kBlockSize],
-                                        static_cast<int>(i % kBlockSize)};
+        for (std::size_t item = 0; item < in.block_count * kBlockSize; ++item) {
+            const SameTriangle triangle{in.tree.blocks[item / kBlockSize],
+                                        static_cast<int>(item % kBlockSize)};
             const Mask<N, Isa> all = best_t > Float<N, Isa>(kNever);
-            for (int part = 0; part < LanesOf<N, Isa>::kRegisters; ++part) {
+            for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {  // as PacketLeaf does
+                const auto sheared =
+                    shear<directions>(part(rays.shear, rays.shear.axis, i), triangle);
+                const auto candidates = part(all, i) & sheared.may_hit();
+                if (none(candidates)) continue;
                 met += static_cast<std::uint64_t>(count(
-                    meet_triangle<directions>(rays, rays.shear.axis, best_t, all, triangle, part)
+                    decide_hits(sheared, part(rays.hit, i), part(best_t, i), candidates, triangle)
                         .hit));
             }
         }

@@ -11,6 +11,17 @@ namespace packet::cuda {
 
 using BestHit = BestHits<1, isa::CudaThread>;
 
+/// Takes a hit of the triangle, for any-hit no more of it than that there is one.
+template <Query query>
+PACKET_DEVICE void take_hit(BestHit& best, const TriangleHits<1, isa::CudaThread>& hits,
+                            const LoadedTriangle& triangle, std::int32_t instance_id) {
+    if constexpr (query == Query::kAny) {
+        best.occlude(0, hits.hit);
+    } else {
+        best.update(0, hits.hit, hits.t, hits.u, hits.v, LaneInt(triangle.prim_id()), instance_id);
+    }
+}
+
 /// What a walk has to be ready for: kernels for one mesh keep no ray of the world at hand.
 enum class Levels : std::uint8_t { kOneMesh, kInstances };
 

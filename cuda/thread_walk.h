@@ -178,8 +178,7 @@ private:
             const LoadedTriangle triangle = load_triangle(tree, item);
             const auto hits = meet_triangle(ray_, best_.t, best_.t > Lane(kNever), triangle);
             if (none(hits.hit)) continue;
-            best_.template update<query>(hits.hit, hits.t, hits.u, hits.v,
-                                         LaneInt(triangle.prim_id()), instance_id_);
+            take_hit<query>(best_, hits, triangle, instance_id_);
         }
     }
 

@@ -15,8 +15,7 @@ PACKET_DEVICE void meet_leaf(const DeviceTree& tree, const PreparedLane& ray,
         const LoadedTriangle triangle = load_triangle(tree, item);
         const auto hits = meet_triangle(ray, best.t, active, triangle);
         if (none(hits.hit)) continue;
-        best.template update<query>(hits.hit, hits.t, hits.u, hits.v, LaneInt(triangle.prim_id()),
-                                    instance_id);
+        take_hit<query>(best, hits, triangle, instance_id);
     }
 }
 

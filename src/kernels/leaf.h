@@ -34,10 +34,15 @@ struct PacketLeaf {
     PACKET_INLINE void meet(const TriangleBlock& block, int lane, Mask<N, Isa> active) const {
         const SameTriangle triangle{block, lane};
         for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
+            const auto sheared = shear<directions>(part(ray.shear, axis, i), triangle);
+            const auto candidates = part(active, i) & sheared.may_hit();
+            if (none(candidates)) continue;
             if constexpr (query == Query::kAny) {
-                best.occlude(i, find_occluded<directions>(ray, axis, best.t, active, triangle, i));
+                best.occlude(
+                    i, decide_occluded<directions>(sheared, ray, best.t, candidates, triangle, i));
             } else {
-                const auto hits = meet_triangle<directions>(ray, axis, best.t, active, triangle, i);
+                const auto hits =
+                    decide_hits(sheared, part(ray.hit, i), part(best.t, i), candidates, triangle);
                 if (none(hits.hit)) continue;
                 best.update(i, hits.hit, hits.t, hits.u, hits.v, block.prim_id[lane], instance_id);
             }

@@ -281,17 +281,6 @@ PACKET_INLINE TriangleHits<N, Isa> decide_hits(const ShearedTriangles<N, Isa>& s
     return out;
 }
 
-/// The hits of the `active` lanes of register i.
-template <Directions directions, int N, class Isa>
-PACKET_INLINE TriangleHits<kPartSize<N, Isa>, Isa> meet_triangle(
-    const PreparedRays<N, Isa>& ray, const int (&axis)[3], const Float<N, Isa>& best_t,
-    Mask<N, Isa> active, const SameTriangle& triangle, int i) {
-    const auto sheared = shear<directions>(part(ray.shear, axis, i), triangle);
-    const auto candidates = part(active, i) & sheared.may_hit();
-    if (none(candidates)) return {candidates, {}, {}, {}};
-    return decide_hits(sheared, part(ray.hit, i), part(best_t, i), candidates, triangle);
-}
-
 /// Which of `candidates` hit, all computed anew: rare, so that registers need not be kept for it.
 template <Directions directions, int N, class Isa>
 PACKET_NOINLINE std::uint32_t decide_part(const PreparedRays<N, Isa>& ray,
@@ -302,22 +291,19 @@ PACKET_NOINLINE std::uint32_t decide_part(const PreparedRays<N, Isa>& ray,
     return decide_hits(sheared, part(ray.hit, i), part(best_t, i), lanes, triangle).hit.bits();
 }
 
-/// As meet_triangle(), for any-hit: which of the lanes hit.
-template <Directions directions, int N, class Isa>
-PACKET_INLINE Mask<kPartSize<N, Isa>, Isa> find_occluded(const PreparedRays<N, Isa>& ray,
-                                                         const int (&axis)[3],
-                                                         const Float<N, Isa>& best_t,
-                                                         Mask<N, Isa> active,
-                                                         const SameTriangle& triangle, int i) {
-    const auto sheared = shear<directions>(part(ray.shear, axis, i), triangle);
-    const auto candidates = part(active, i) & sheared.may_hit();
-    if (none(candidates)) return candidates;
+/// For any-hit: which of `candidates`, lanes of register i that may hit, do.
+template <Directions directions, int N, class Isa, int kPart>
+PACKET_INLINE Mask<kPart, Isa> decide_occluded(const ShearedTriangles<kPart, Isa>& sheared,
+                                               const PreparedRays<N, Isa>& ray,
+                                               const Float<N, Isa>& best_t,
+                                               Mask<kPart, Isa> candidates,
+                                               const SameTriangle& triangle, int i) {
     const auto verdicts = judge(sheared, part(ray.hit, i), part(best_t, i));
     const auto hit = candidates & verdicts.hit;
     const auto undecided = candidates & ~(verdicts.hit | verdicts.miss);
     if (none(undecided)) [[likely]]
         return hit;
-    return hit | Mask<kPartSize<N, Isa>, Isa>::from_bits(
+    return hit | Mask<kPart, Isa>::from_bits(
                      decide_part<directions>(ray, best_t, undecided.bits(), triangle, i));
 }
 
