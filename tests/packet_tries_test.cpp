@@ -5,13 +5,13 @@
 
 using namespace packet;
 
-TEST_CASE("two tries in a row without hope end it") {
+TEST_CASE("two tries without hope end it, if they are worth more than the sky") {
     PacketTries tries(KernelTable::kTile, 0.95);
-    tries.add({1.0, 2.0});
-    tries.add({1.0, 0.5});
-    tries.add({1.0, 1.3});
+    tries.add({0.1, 0.2});
     CHECK(tries.is_open());
-    tries.add({1.0, 1.3});
+    tries.add({1.0, 0.9});
+    CHECK(tries.is_open());
+    tries.add({1.0, 2.0});
     CHECK_FALSE(tries.is_open());
     CHECK(tries.best() == KernelTable::kTile);
 }

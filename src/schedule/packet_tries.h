@@ -15,8 +15,8 @@ namespace packet {
 
 class PacketTries {
 public:
-    static constexpr std::size_t kCount = 7;
-    /// Seconds that the same rays took each way.
+    static constexpr std::size_t kCount = 9;
+    /// Seconds a ray.
     struct Try {
         double planned = 0.0, packets = 0.0;
     };
@@ -30,8 +30,8 @@ public:
     /// As far as is known: the planned kernel, until there are enough tries.
     [[nodiscard]] KernelTable::Kernel best() const noexcept { return best_; }
 
-    /// Thread-safe. Two tries in a row without any hope for packets are enough, or a few that leave
-    /// little doubt, or kCount.
+    /// Thread-safe. Two tries that leave packets no hope are enough, or a few that leave little
+    /// doubt, or kCount. Those count most that take longest, not those of the sky.
     void add(const Try& made) {
         const std::scoped_lock lock(mutex_);
         if (!is_open_) return;
@@ -39,32 +39,34 @@ public:
         const bool is_full = made_ == kCount;
         const bool are_few = made_ < kFewest;
         const bool are_faster = !are_few && ratio() < (is_full ? packets_below_ : kClearlyFaster);
-        const bool are_slower = !are_few && ratio() > kClearlySlower;
-        const bool are_hopeless =
-            made_ >= 2 && is_hopeless(tries_[made_ - 1]) && is_hopeless(tries_[made_ - 2]);
+        const bool are_slower =
+            made_ >= 2 && (are_few ? ratio_of_all() > kHopeless : ratio() > kClearlySlower);
         if (are_faster) best_ = KernelTable::kPacket16;
-        if (is_full || are_faster || are_slower || are_hopeless) is_open_ = false;
+        if (is_full || are_faster || are_slower) is_open_ = false;
     }
 
 private:
     static constexpr std::size_t kFewest = 4;
-    static constexpr double kClearlyFaster = 0.85, kClearlySlower = 1.1;
+    static constexpr double kClearlyFaster = 0.85, kClearlySlower = 1.1, kHopeless = 1.25;
 
-    [[nodiscard]] static bool is_hopeless(const Try& t) { return t.packets > 1.25 * t.planned; }
-    /// The time of packets so far, in units of the other's. Without the two tries that speak most
-    /// for either, for the system may have interrupted them.
+    /// The time of packets so far, in units of the other's.
+    [[nodiscard]] double ratio_of_all() const { return ratio_without(nullptr, nullptr); }
+    /// Without the two tries that speak most for either, for the system may have interrupted them.
     [[nodiscard]] double ratio() const {
-        const std::span made = std::span(tries_).first(made_);
         const auto [least, most] = std::ranges::minmax_element(
-            made, {}, [](const Try& t) { return t.planned - t.packets; });
+            made(), {}, [](const Try& t) { return t.planned - t.packets; });
+        return ratio_without(&*least, &*most);
+    }
+    [[nodiscard]] double ratio_without(const Try* one, const Try* other) const {
         Try sum;
-        for (auto t = made.begin(); t != made.end(); ++t) {
-            if (t == least || t == most) continue;
-            sum.planned += t->planned;
-            sum.packets += t->packets;
+        for (const Try& t : made()) {
+            if (&t == one || &t == other) continue;
+            sum.planned += t.planned;
+            sum.packets += t.packets;
         }
         return sum.packets / sum.planned;
     }
+    [[nodiscard]] std::span<const Try> made() const { return std::span(tries_).first(made_); }
 
     double packets_below_;
     std::mutex mutex_;

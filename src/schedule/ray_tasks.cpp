@@ -33,8 +33,8 @@ std::size_t RayTasks::count() const {
     return image_.is_image() ? image_.tile_count() : (rays_.size() + run_length_ - 1) / run_length_;
 }
 
-void RayTasks::run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch,
-                   std::size_t most) const {
+void RayTasks::run(std::size_t task, TraceBatch batch,
+                   const std::function<void(const TraceBatch&)>& trace) const {
     PixelOrder::Indices pixels;
     std::unique_ptr<StreamOrder> sorted;
     std::size_t first = task * run_length_;
@@ -53,9 +53,8 @@ void RayTasks::run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch
     batch.rays = rays_.data() + first;
     if (batch.hits != nullptr) batch.hits += first;
     if (batch.occluded != nullptr) batch.occluded += first;
-    batch.count = std::min(batch.count, most);
     if (batch.stats != nullptr) batch.stats->rays += batch.count;
-    kernel(batch);
+    trace(batch);
     if (sorted != nullptr) orders_->give_back(std::move(sorted));
 }
 

@@ -8,7 +8,7 @@
 #include <packet/ray.h>
 
 #include <cstddef>
-#include <limits>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -32,10 +32,9 @@ public:
     void sort_together(const Parallel& parallel);
 
     [[nodiscard]] std::size_t count() const;
-    /// Runs a kernel on the rays of a task, the first `most` of them if there are more. `batch`
-    /// says where results go, for all rays.
-    void run(std::size_t task, KernelTable::Batch kernel, TraceBatch batch,
-             std::size_t most = std::numeric_limits<std::size_t>::max()) const;
+    /// Calls trace(batch) with the rays of a task. `batch` says where results go, for all rays.
+    void run(std::size_t task, TraceBatch batch,
+             const std::function<void(const TraceBatch&)>& trace) const;
 
 private:
     // Some 100 us of work, so that tasks are cheap and cores end together.

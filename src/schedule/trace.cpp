@@ -12,7 +12,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <string>
 
@@ -20,9 +22,9 @@ namespace packet {
 
 namespace {
 
-// Packets are tried if that is little of the whole: 4 times the rays of a try for each, of tasks of
-// 512 rays or more.
+// Packets are tried if that is so little of the whole that the slower way does not count.
 constexpr std::size_t kLeastTasksForTries = 128;
+// Rays of a task that go the same way in a try: those of a tile.
 constexpr std::size_t kRaysOfTry = 128;
 
 /// One call of trace_closest or trace_any, with all that its tasks share.
@@ -124,39 +126,60 @@ private:
                task / stride_of_tries() < PacketTries::kCount;
     }
 
-    /// Traces the task of a try, and if it is not known yet what is faster, the first of its rays
-    /// again both ways, which give the same hits. Other rays, though neighbours, tell nothing: one
-    /// task may be a tree, and the next one the sky.
+    /// Traces the task of a try: some of its rays by the planned kernel, their neighbours by
+    /// packets, if it is not known yet what is faster. Their hits are as good as any.
     template <class KernelOf>
-    void make_try(std::size_t i, const KernelOf& kernel, TraceBatch batch,
+    void make_try(std::size_t i, const KernelOf& kernel, const TraceBatch& batch,
                   PacketTries& tries) const {
         // The first two are of different halves, and so on: an image's upper half may be the sky.
-        const std::size_t place = (4 * i + 5) % PacketTries::kCount;
+        const std::size_t place = (5 * i + 6) % PacketTries::kCount;
         const std::size_t task = place * stride_of_tries();
-        run_task(task, kernel(tries.best()), batch);
-        if (!tries.is_open()) return;
-        TraceStats not_counted;
-        batch.stats = options_.stats != nullptr ? &not_counted : nullptr;
-        const auto time = [&](KernelTable::Kernel which) {
-            const auto start = std::chrono::steady_clock::now();
-            tasks_.run(task, kernel(which), batch, kRaysOfTry);
-            return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        };
-        // The first time finds a kernel's code and its branches out of the caches.
-        PacketTries::Try made{time(plan_.kernel), time(KernelTable::kPacket16)};
-        made.planned = std::min(made.planned, time(plan_.kernel));
-        made.packets = std::min(made.packets, time(KernelTable::kPacket16));
-        tries.add(made);
+        if (!tries.is_open()) return run_task(task, kernel(tries.best()), batch);
+        double seconds[2] = {0.0, 0.0};
+        std::size_t rays[2] = {0, 0};
+        run_task(task, batch, [&](const TraceBatch& all) {
+            // As in A B B A B A A B, so that neither way is ahead of the other or behind it, in the
+            // image or in what it leaves in the caches.
+            for (std::size_t first = 0, turn = 0; first < all.count; first += kRaysOfTry, ++turn) {
+                const std::size_t way = static_cast<std::size_t>(std::popcount(turn)) % 2;
+                const TraceBatch part = part_of(all, first, kRaysOfTry);
+                const auto start = std::chrono::steady_clock::now();
+                kernel(way == 0 ? plan_.kernel : KernelTable::kPacket16)(part);
+                seconds[way] +=
+                    std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+                rays[way] += part.count;
+            }
+        });
+        if (rays[1] == 0) return;  // less than two tiles, at an image's edge
+        tries.add(
+            {seconds[0] / static_cast<double>(rays[0]), seconds[1] / static_cast<double>(rays[1])});
     }
 
-    void run_task(std::size_t task, KernelTable::Batch kernel, TraceBatch batch) const {
+    /// Rays `first` to `first + most` of a task, as far as there are so many.
+    static TraceBatch part_of(TraceBatch task, std::size_t first, std::size_t most) {
+        task.count = std::min(task.count - first, most);
+        if (task.order != nullptr) {
+            task.order += first;
+            return task;
+        }
+        task.rays += first;
+        if (task.hits != nullptr) task.hits += first;
+        if (task.occluded != nullptr) task.occluded += first;
+        return task;
+    }
+
+    void run_task(std::size_t task, KernelTable::Batch kernel, const TraceBatch& batch) const {
+        run_task(task, batch, kernel);
+    }
+    void run_task(std::size_t task, TraceBatch batch,
+                  const std::function<void(const TraceBatch&)>& trace) const {
         if (options_.stats == nullptr) {
-            tasks_.run(task, kernel, batch);
+            tasks_.run(task, batch, trace);
             return;
         }
         TraceStats stats;
         batch.stats = &stats;
-        tasks_.run(task, kernel, batch);
+        tasks_.run(task, batch, trace);
         add_stats(stats);
     }
 
