@@ -47,7 +47,7 @@ public:
 
 private:
     static constexpr std::size_t kFewest = 4;
-    static constexpr double kClearlyFaster = 0.85, kClearlySlower = 1.1, kHopeless = 1.25;
+    static constexpr double kClearlyFaster = 0.75, kClearlySlower = 1.1, kHopeless = 1.25;
 
     /// The time of packets so far, in units of the other's.
     [[nodiscard]] double ratio_of_all() const { return ratio_without(nullptr, nullptr); }

@@ -44,7 +44,7 @@ TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
 }
 
 /// Closest-hit, or any-hit of rays in the order in which they are to be traced.
-TracePlan plan_tiles() { return {.kernel = KernelTable::kTile, .packets_below = 0.95}; }
+TracePlan plan_tiles() { return {.kernel = KernelTable::kTile, .packets_below = 0.9}; }
 
 /// Whether so many rays are worth sorting, and may be traced by streams.
 bool may_stream(const SceneAccel& scene, std::span<const Ray> rays) {
