@@ -39,8 +39,8 @@ public:
 
     /// Builds what tracing needs. On an Error, or what options.progress throws, the scene stays as
     /// it was, an earlier commit included, and nothing is left of the build. Memory that builds
-    /// give back, up to 512 MB of it, stays reserved for the next ones; the system may take it
-    /// meanwhile (MADV_FREE).
+    /// and traces give back, up to 512 MB of it, stays reserved for the next ones; the system may
+    /// take all but 32 MB meanwhile (MADV_FREE).
     void commit(const BuildOptions& options = {});
 
     [[nodiscard]] std::span<const TriangleMesh> meshes() const noexcept { return meshes_; }
