@@ -84,7 +84,7 @@ public:
             parallel_.for_pieces(try_count + tasks_.count(), 1, [&](std::size_t i, std::size_t) {
                 if (i < try_count) return make_try(i, kernel, batch, tries);
                 const std::size_t task = i - try_count;
-                if (!is_of_try(task)) run_task(task, kernel(tries.best()), batch);
+                if (!is_of_try(task)) run_task(task, batch, kernel(tries.best()));
                 parallel_.advance(1.0 / static_cast<double>(tasks_.count()));
             });
         });
@@ -134,7 +134,7 @@ private:
         // The first two are of different halves, and so on: an image's upper half may be the sky.
         const std::size_t place = (5 * i + 6) % PacketTries::kCount;
         const std::size_t task = place * stride_of_tries();
-        if (!tries.is_open()) return run_task(task, kernel(tries.best()), batch);
+        if (!tries.is_open()) return run_task(task, batch, kernel(tries.best()));
         double seconds[2] = {0.0, 0.0};
         std::size_t rays[2] = {0, 0};
         run_task(task, batch, [&](const TraceBatch& all) {
@@ -168,9 +168,6 @@ private:
         return task;
     }
 
-    void run_task(std::size_t task, KernelTable::Batch kernel, const TraceBatch& batch) const {
-        run_task(task, batch, kernel);
-    }
     void run_task(std::size_t task, TraceBatch batch,
                   const std::function<void(const TraceBatch&)>& trace) const {
         if (options_.stats == nullptr) {
