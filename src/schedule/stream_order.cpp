@@ -127,26 +127,71 @@ private:
     float scale_ = 0.0f;
 };
 
-/// Calls take(i, key) with what each ray is sorted by: kKeyBits.
+/// What rays are sorted by: kKeyBits.
+PACKET_INLINE Ints keys_of(const Ray* const (&rays)[kTogether], const OriginCells& cells) noexcept {
+    const FourRays columns(rays);
+    return direction_classes(columns.dir) << 3 * kCellBits | cells.codes(columns.org);
+}
+
+/// Calls take(i, key) for each ray.
 template <class Take>
 void for_each_key(std::span<const Ray> rays, const OriginCells& cells, Take&& take) {
     for (std::size_t first = 0; first < rays.size(); first += kTogether) {
         const std::size_t count = std::min(kTogether, rays.size() - first);
         const Ray* some[kTogether];
         for (std::size_t i = 0; i < kTogether; ++i) some[i] = &rays[first + std::min(i, count - 1)];
-        const FourRays columns(some);
-        const Ints keys =
-            direction_classes(columns.dir) << 3 * kCellBits | cells.codes(columns.org);
+        const Ints keys = keys_of(some, cells);
         for (std::size_t i = 0; i < count; ++i)
             take(first + i, static_cast<std::uint32_t>(keys[i]));
     }
 }
 
-/// Turns counts into the place of the first item of each digit.
+/// An array in four pieces, which are gone through side by side: neighbours often have the same
+/// digit, and its count must be written before it can be read again.
+class Pieces {
+public:
+    explicit Pieces(std::size_t count) : count_(count) {
+        while (kTogether << shift_ < count) ++shift_;
+    }
+    [[nodiscard]] std::size_t length() const noexcept { return std::size_t{1} << shift_; }
+    [[nodiscard]] std::size_t piece_of(std::size_t i) const noexcept { return i >> shift_; }
+    /// Items 0 to this of each piece have one of each other piece beside them.
+    [[nodiscard]] std::size_t complete() const noexcept {
+        const std::size_t before_last = (kTogether - 1) * length();
+        return count_ > before_last ? count_ - before_last : 0;
+    }
+    /// Calls take(i, piece) for the others.
+    template <class Take>
+    void for_rest(Take&& take) const {
+        for (std::size_t k = 0; k < kTogether; ++k) {
+            const std::size_t end = std::min(count_, (k + 1) * length());
+            for (std::size_t i = k * length() + complete(); i < end; ++i) take(i, k);
+        }
+    }
+    /// Calls take(i, piece) for all.
+    template <class Take>
+    void for_each(Take&& take) const {
+        for (std::size_t i = 0; i < complete(); ++i) {
+            for (std::size_t k = 0; k < kTogether; ++k) take(k * length() + i, k);
+        }
+        for_rest(take);
+    }
+
+private:
+    std::size_t count_;
+    int shift_ = 0;
+};
+
+/// Of each digit: how many items of each piece have it, then the place of the next one.
+template <int kBits>
+using PieceCounts = std::array<std::array<std::uint32_t, kTogether>, 1u << kBits>;
+
 template <std::size_t kCount>
-void scan(std::array<std::uint32_t, kCount>& counts) noexcept {
+void scan(std::array<std::array<std::uint32_t, kTogether>, kCount>& counts) noexcept {
     std::uint32_t place = 0;
-    for (std::uint32_t& count : counts) place += std::exchange(count, place);
+    for (auto& pieces : counts) {
+        for (std::uint32_t& count : pieces) place += std::exchange(count, place);
+    }
 }
 
 }  // namespace
@@ -154,19 +199,41 @@ void scan(std::array<std::uint32_t, kCount>& counts) noexcept {
 std::span<const std::uint32_t> StreamOrder::sort(std::span<const Ray> rays) {
     PACKET_ASSERT(rays.size() <= kMostRays);
     items_.resize(rays.size()), scratch_.resize(rays.size());
+    const std::span<std::uint32_t> items = items_, scratch = scratch_;
     const OriginCells cells(rays);
-    std::array<std::uint32_t, 1u << kLowBits> low = {};
-    std::array<std::uint32_t, 1u << kHighBits> high = {};
-    for_each_key(rays, cells, [&](std::size_t i, std::uint32_t key) {
-        const std::uint32_t item = key << kIndexBits | static_cast<std::uint32_t>(i);
-        ++low[low_digit(item)], ++high[high_digit(item)];
-        items_[i] = item;
-    });
-    scan(low), scan(high);
-    for (const std::uint32_t item : items_) scratch_[low[low_digit(item)]++] = item;
-    for (const std::uint32_t item : scratch_) {
-        items_[high[high_digit(item)]++] = item & ((1u << kIndexBits) - 1);
+    const Pieces pieces(rays.size());
+    PieceCounts<kLowBits> low = {};
+    PieceCounts<kHighBits> high = {};
+
+    const auto take = [&](std::size_t i, std::size_t piece, std::int32_t key) {
+        const std::uint32_t item =
+            static_cast<std::uint32_t>(key) << kIndexBits | static_cast<std::uint32_t>(i);
+        ++low[low_digit(item)][piece];
+        items[i] = item;
+    };
+    for (std::size_t i = 0; i < pieces.complete(); ++i) {
+        const Ray* some[kTogether];
+        for (std::size_t k = 0; k < kTogether; ++k) some[k] = &rays[k * pieces.length() + i];
+        const Ints keys = keys_of(some, cells);
+        for (std::size_t k = 0; k < kTogether; ++k) take(k * pieces.length() + i, k, keys[k]);
     }
+    pieces.for_rest([&](std::size_t i, std::size_t piece) {
+        const Ray* const ray = &rays[i];
+        take(i, piece, keys_of({ray, ray, ray, ray}, cells)[0]);
+    });
+
+    scan(low);
+    pieces.for_each([&](std::size_t i, std::size_t piece) {
+        const std::uint32_t item = items[i];
+        const std::uint32_t place = low[low_digit(item)][piece]++;
+        ++high[high_digit(item)][pieces.piece_of(place)];
+        scratch[place] = item;
+    });
+    scan(high);
+    pieces.for_each([&](std::size_t i, std::size_t piece) {
+        const std::uint32_t item = scratch[i];
+        items[high[high_digit(item)][piece]++] = item & ((1u << kIndexBits) - 1);
+    });
     return items_;
 }
 

@@ -11,6 +11,9 @@ namespace {
 
 // Fewer fill not much more than one task does.
 constexpr std::size_t kLeastRaysTogether = 8 * StreamOrder::kMostRays;
+// Rays that meet less than this have not enough of the way in common to pay for being read and
+// written in an order that is far from theirs. Measured: docs/benchmarking.md#streams.
+constexpr double kLeastCostTogether = 28.0;
 
 KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
@@ -39,6 +42,7 @@ TracePlan plan_treelets() { return {.kernel = KernelTable::kStream, .by_treelets
 TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
     constexpr std::size_t kMostTogether = 0xFFFFFFFF;
     const bool together = rays.size() >= kLeastRaysTogether && rays.size() <= kMostTogether &&
+                          scene.stats.sah_cost >= kLeastCostTogether &&
                           are_scattered(rays, scene.top.bounds);
     return {KernelTable::kStream, together ? Sorting::kTogether : Sorting::kByTask};
 }
