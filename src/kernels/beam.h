@@ -26,6 +26,8 @@ struct BeamBounds {
     float away;                   ///< the sign of z - anchor where rays are
     float begin, end;             ///< of the rays, along z times its direction
     float margin;                 ///< what rounding may come to, amply
+    float origin[3];              ///< x, y and z where the rays start
+    bool has_origin;              ///< if all of them start there
     bool is_sound;                ///< no ray looks back, and all numbers are finite
 
     /// How wide the beam gets on a way along z.
@@ -97,7 +99,8 @@ public:
         const float sign = out.near_side == 0 ? 1.0f : -1.0f;
         LaneBounds<N, Isa> slope[2], begin, end;
         F first(__builtin_huge_valf()), margin(0.0f);
-        M looks_ahead = M::from_bits(~0u);
+        M looks_ahead = M::from_bits(~0u), starts_there = looks_ahead;
+        find_start(out.origin);
         for (int p = 0; p < packet_count_; ++p) {
             const PreparedRays<N, Isa>& ray = rays_[p];
             const M active = is_active(p);
@@ -110,6 +113,7 @@ public:
             end.extend(active, z + best_[p].t * speed);
             for (int a = 0; a < 3; ++a) {
                 margin = max(margin, select(active, ray.hit.org[0][a] - ray.hit.org[1][a], margin));
+                starts_there = starts_there & (~active | (ray.shear.org[a] == F(out.origin[a])));
             }
         }
         const F zero(0.0f);
@@ -123,6 +127,7 @@ public:
         out.margin = -4.0f * least[3];
         const float lowest[2] = {least[4], least[5]}, highest[2] = {-least[6], -least[7]};
         anchor(out, lowest, highest, least[0] * sign, sign);
+        out.has_origin = none(~starts_there);
         out.is_sound = none(~looks_ahead) && extent(out) < kFarthest;  // false for NaN
         return out;
     }
@@ -131,6 +136,16 @@ private:
     static constexpr float kFarthest = 1e30f;
 
     PACKET_INLINE M is_active(int packet) const { return best_[packet].t > F(kNever); }
+
+    /// Where the first active ray starts, or one of the first packet's if that has none.
+    PACKET_INLINE void find_start(float (&out)[3]) const {
+        const int lane = __builtin_ctz(is_active(0).bits() | 1u << (N - 1));
+        for (int a = 0; a < 3; ++a) {
+            float org[N];
+            rays_[0].shear.org[a].store(org);
+            out[a] = org[lane];
+        }
+    }
 
     struct Crossing {
         float lower[2], upper[2];

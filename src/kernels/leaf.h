@@ -33,8 +33,14 @@ struct PacketLeaf {
     /// The triangle of one lane of a block.
     PACKET_INLINE void meet(const TriangleBlock& block, int lane, Mask<N, Isa> active) const {
         const SameTriangle triangle{block, lane};
+        meet(triangle, triangle, active);
+    }
+    /// `corners` is the triangle, or relative to the rays' origin.
+    template <class Corners>
+    PACKET_INLINE void meet(const Corners& corners, const SameTriangle& triangle,
+                            Mask<N, Isa> active) const {
         for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
-            const auto sheared = shear<directions>(part(ray.shear, axis, i), triangle);
+            const auto sheared = shear<directions>(part(ray.shear, axis, i), corners);
             const auto candidates = part(active, i) & sheared.may_hit();
             if (none(candidates)) continue;
             if constexpr (query == Query::kAny) {
@@ -44,7 +50,7 @@ struct PacketLeaf {
                 const auto hits =
                     decide_hits(sheared, part(ray.hit, i), part(best.t, i), candidates, triangle);
                 if (none(hits.hit)) continue;
-                best.update(i, hits.hit, hits.t, hits.u, hits.v, block.prim_id[lane], instance_id);
+                best.update(i, hits.hit, hits.t, hits.u, hits.v, triangle.prim_id(), instance_id);
             }
         }
     }

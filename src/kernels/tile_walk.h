@@ -56,9 +56,11 @@ public:
           instance_id_(instance_id),
           use_(use),
           stats_(stats) {
+        has_origin_ = bounds.has_origin;
         for (int a = 0; a < 3; ++a) {
             near_side_[a] = rays[0].near_side[a];
             axis_[a] = bounds.axis[a];
+            origin_[a] = bounds.origin[a];
         }
     }
 
@@ -179,12 +181,24 @@ private:
             by_rays |= static_cast<std::uint32_t>(is_few) << p;
         }
         for (; by_rays != 0; by_rays &= by_rays - 1) meet_by_rays(block, __builtin_ctz(by_rays));
+        if (has_origin_) {
+            const RelativeBlock relative(block, origin_, axis_, Isa());
+            meet_pairs(block, pairs, [&](int lane) { return RelativeTriangle{relative, lane}; });
+        } else {
+            meet_pairs(block, pairs, [&](int lane) { return SameTriangle{block, lane}; });
+        }
+    }
+    /// What of a triangle a packet meets first, corners_of(lane) tells.
+    template <class CornersOf>
+    PACKET_INLINE void meet_pairs(const TriangleBlock& block,
+                                  const std::uint64_t (&pairs)[kTilePackets<N> / 8],
+                                  CornersOf&& corners_of) {
         for (int word = 0; word < kTilePackets<N> / 8; ++word) {
             for (std::uint64_t left = pairs[word]; left != 0; left &= left - 1) {
-                const int pair = __builtin_ctzll(left), p = 8 * word + pair / 8;
+                const int pair = __builtin_ctzll(left), p = 8 * word + pair / 8, lane = pair % 8;
                 const PacketLeaf<query, Directions::kShared, N, Isa> leaf{rays_[p], axis_,
                                                                           instance_id_, best_[p]};
-                leaf.meet(block, pair % 8, active_[p]);
+                leaf.meet(corners_of(lane), SameTriangle{block, lane}, active_[p]);
             }
         }
     }
@@ -204,6 +218,8 @@ private:
     Beam<Isa> beam_;
     PacketSlopes<kTilePackets<N>, Isa> slopes_;
     int near_side_[3], axis_[3];  ///< of all
+    bool has_origin_;             ///< all start at origin_
+    float origin_[3];
     std::int32_t instance_id_;
     TileUse& use_;  ///< counted for any-hit
     Stats& stats_;

@@ -121,6 +121,35 @@ struct SameTriangle {
     PACKET_INLINE F get(int corner, int axis) const {
         return block.v[corner][axis][lane];
     }
+    [[nodiscard]] PACKET_INLINE std::int32_t prim_id() const { return block.prim_id[lane]; }
+};
+
+/// The corners of a block's triangles less the origin that all rays of a tile share, axes in the
+/// order of their shear: found once for eight triangles, not for each of them and each packet. The
+/// bits are those that each lane would find, but for the sign of zeros, which decides nothing.
+struct RelativeBlock {
+    alignas(32) float v[3][3][kBlockSize];
+
+    template <class Isa>
+    PACKET_INLINE RelativeBlock(const TriangleBlock& block, const float (&org)[3],
+                                const int (&axis)[3], Isa) {
+        using F = Float<kBlockSize, Isa>;
+        for (int corner = 0; corner < 3; ++corner) {
+            for (int a = 0; a < 3; ++a)
+                (F::load(block.v[corner][axis[a]]) - F(org[a])).store(v[corner][a]);
+        }
+    }
+};
+
+/// One of its triangles, in all lanes.
+struct RelativeTriangle {
+    const RelativeBlock& block;
+    int lane;
+
+    template <class F>
+    PACKET_INLINE F get(int corner, int axis) const {
+        return block.v[corner][axis][lane];
+    }
 };
 
 /// A block's triangles, one a lane.
@@ -181,6 +210,15 @@ struct ShearedTriangles {
         return (F(0.0f) <= lowest) | (highest <= F(0.0f));  // false for NaN: no triangle
     }
 };
+
+template <Directions directions, int N, class Isa>
+PACKET_INLINE Float3<N, Isa> to_ray_space(const ShearRays<N, Isa>& ray,
+                                          const RelativeTriangle& triangle, int corner) {
+    using F = Float<N, Isa>;
+    const F z = triangle.get<F>(corner, 2);
+    return {triangle.get<F>(corner, 0) - ray.shear_x * z,
+            triangle.get<F>(corner, 1) - ray.shear_y * z, z};
+}
 
 template <Directions directions, int N, class Isa, class Triangles>
 PACKET_INLINE ShearedTriangles<N, Isa> shear(const ShearRays<N, Isa>& ray,
