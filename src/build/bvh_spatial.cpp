@@ -1,7 +1,7 @@
 // Where the best split of a node's references leaves halves that overlap, the best split of its
 // space is tried as well, and the cheaper one taken. Cutting adds references: what a node may add
-// is shared by its children in proportion to what they hold, so it does not depend on which thread
-// comes first.
+// is shared by its children in proportion to what they hold and to their area, so it does not
+// depend on which thread comes first.
 //
 // Stich, Friedrich, Dietrich. Spatial splits in bounding volume hierarchies. High-Performance
 // Graphics 2009.
@@ -18,11 +18,11 @@ namespace packet {
 
 namespace {
 
-// Overlap that is worth a try, as a share of the root's area: Stich et al. lose nothing by it.
-constexpr float kLeastOfRoot = 1e-5f;
-// And as a share of the node's own: of a million triangles terrain then takes half the time, city a
-// fifth less, for 0.7% of the SAH cost at most.
-constexpr float kLeastOfNode = 0.2f;
+// Overlap that is worth a try, as a share of the root's area and of the node's own: smooth surfaces
+// have too little everywhere, and building takes half the time. Measured:
+// docs/benchmarking.md#trees-of-high-quality.
+constexpr float kLeastOfRoot = 3e-5f;
+constexpr float kLeastOfNode = 0.05f;
 
 float overlap(const Bounds3f& a, const Bounds3f& b) {
     return Bounds3f{glm::max(a.lower, b.lower), glm::min(a.upper, b.upper)}.half_area();

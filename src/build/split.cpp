@@ -34,10 +34,30 @@ std::size_t halve(const NodeRange& node) {
     return half;
 }
 
+namespace {
+
+/// Room goes where rays will come by and find triangles that are worth cutting: by the number of
+/// references, times the area of their box.
+std::size_t share_of_first(std::size_t room, const std::size_t (&count)[2],
+                           const NodeBounds (&bounds)[2]) {
+    if (room == 0) return 0;
+    double need[2];
+    for (int i = 0; i < 2; ++i) {
+        need[i] = static_cast<double>(count[i]) * static_cast<double>(bounds[i].box.half_area());
+    }
+    const double all = need[0] + need[1];
+    const double part =
+        all > 0.0 ? need[0] / all
+                  : static_cast<double>(count[0]) / static_cast<double>(count[0] + count[1]);
+    return std::min(room, static_cast<std::size_t>(part * static_cast<double>(room)));
+}
+
+}  // namespace
+
 Halves divide(const NodeRange& node, std::size_t first, const NodeBounds& bounds0,
               const NodeBounds& bounds1) {
-    const std::size_t count = node.refs.size(), second = count - first;
-    const std::size_t room0 = node.room * first / count;
+    const std::size_t second = node.refs.size() - first;
+    const std::size_t room0 = share_of_first(node.room, {first, second}, {bounds0, bounds1});
     // The first's room lies between them: as many of the second's move behind the others.
     const std::size_t moved = std::min(room0, second);
     Reference* const begin = node.refs.data() + first;

@@ -82,7 +82,8 @@ template <class Result, class FoldPiece, class Join>
 /// Returns where the second half starts.
 [[nodiscard]] std::size_t halve(const NodeRange& node);
 
-/// The first references and the others, with their bounds; each gets room in proportion.
+/// The first references and the others, with their bounds; each gets room in proportion to
+/// its references and area.
 [[nodiscard]] Halves divide(const NodeRange& node, std::size_t first, const Parallel& parallel);
 [[nodiscard]] Halves divide(const NodeRange& node, std::size_t first, const NodeBounds& bounds0,
                             const NodeBounds& bounds1);

@@ -104,21 +104,32 @@ PACKET_NOINLINE std::uint32_t decide_block(const SingleRay& ray, float best_t,
         .hit.bits();
 }
 
-/// As meet_block(), for any-hit: the triangles that the ray hits, or one of them.
+/// Triangles of a block that a ray surely hits, and all that it may hit.
+struct Occluders {
+    std::uint32_t sure, possible;
+};
+
+/// Of `candidates`, triangles that the ray may hit.
 template <class Isa>
-PACKET_INLINE std::uint32_t find_occluders(const ShearRays<kBlockSize, Isa>& shear_ray,
-                                           const SingleRay& ray, float best_t,
-                                           const TriangleBlock& block) {
-    const auto sheared = shear<Directions::kShared>(shear_ray, BlockTriangles{block});
-    const auto candidates = sheared.may_hit();
-    if (none(candidates)) return 0;
+PACKET_INLINE Occluders find_occluders(const ShearedTriangles<kBlockSize, Isa>& sheared,
+                                       Mask<kBlockSize, Isa> candidates, const SingleRay& ray,
+                                       float best_t) {
     const Verdicts<kBlockSize, Isa> verdicts =
         judge(sheared, SingleHitRay<kBlockSize, Isa>(ray), Float<kBlockSize, Isa>(best_t));
-    const std::uint32_t sure = (candidates & verdicts.hit).bits();
-    const std::uint32_t undecided = (candidates & ~verdicts.miss).bits();
-    if (sure != 0 || undecided == 0) [[likely]]
-        return sure;
-    return decide_block<Isa>(ray, best_t, undecided, block);
+    return {(candidates & verdicts.hit).bits(), (candidates & ~verdicts.miss).bits()};
+}
+
+/// As meet_block(), for any-hit: whether the ray hits a triangle.
+template <class Isa>
+PACKET_INLINE bool is_occluded(const ShearRays<kBlockSize, Isa>& shear_ray, const SingleRay& ray,
+                               float best_t, const TriangleBlock& block) {
+    const auto sheared = shear<Directions::kShared>(shear_ray, BlockTriangles{block});
+    const auto candidates = sheared.may_hit();
+    if (none(candidates)) return false;
+    const Occluders found = find_occluders(sheared, candidates, ray, best_t);
+    if (found.sure != 0 || found.possible == 0) [[likely]]
+        return found.sure != 0;
+    return decide_block<Isa>(ray, best_t, found.possible, block) != 0;
 }
 
 /// A single ray meets the blocks of a range.
@@ -133,7 +144,7 @@ struct SingleLeaf {
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
             const auto shear = shear_of<kBlockSize, Isa>(opaque(ray));
             if constexpr (query == Query::kAny) {
-                if (find_occluders(shear, ray, best.t.r[0], tree.blocks[b]) == 0) continue;
+                if (!is_occluded(shear, ray, best.t.r[0], tree.blocks[b])) continue;
                 best.occlude(0);
                 return;
             } else {

@@ -53,7 +53,7 @@ private:
     PACKET_INLINE void meet(const TriangleBlock& block, int lane, const SingleRay& ray) {
         const auto shear = shear_of<kBlockSize, Isa>(ray);
         if constexpr (query == Query::kAny) {
-            if (find_occluders(shear, ray, best_t_[lane], block) == 0) return;
+            if (!is_occluded(shear, ray, best_t_[lane], block)) return;
             best_.occlude(lane);
             best_t_[lane] = kNever;
         } else {

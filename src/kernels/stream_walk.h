@@ -243,18 +243,63 @@ private:
     PACKET_INLINE void meet_leaf(Stream<Isa>& stream, BlockRange range, RaySet active,
                                  float enter) const {
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            for (RaySet left = active & stream.looking; left != 0; left &= left - 1) {
-                const int r = __builtin_ctzll(left);
-                if (query == Query::kClosest && enter > stream.rays.ray[r].best_t) continue;
-                stats_.triangles(__builtin_popcount(range.lanes(b)));
-                meet_ray(stream, r, tree_.blocks[b]);
+            const int triangles = __builtin_popcount(range.lanes(b));
+            if constexpr (query == Query::kAny) {
+                occlude(stream, active & stream.looking, tree_.blocks[b], triangles);
+            } else {
+                meet_block(stream, active, enter, tree_.blocks[b], triangles);
             }
         }
     }
 
-    PACKET_INLINE void meet_ray(Stream<Isa>& stream, int r, const TriangleBlock& block) const {
+    PACKET_INLINE void meet_block(Stream<Isa>& stream, RaySet active, float enter,
+                                  const TriangleBlock& block, int triangles) const {
         StreamRays<Isa>& rays = stream.rays;
-        StreamRay& ray = rays.ray[r];
+        for (RaySet left = active; left != 0; left &= left - 1) {
+            const int r = __builtin_ctzll(left);
+            StreamRay& ray = rays.ray[r];
+            if (enter > ray.best_t) continue;
+            stats_.triangles(triangles);
+            packet::meet_block(shear_of(rays, r), rays.single(r), ray.best_t, block,
+                               [&](const BlockHit& hit) {
+                                   if (!(hit.t < ray.best_t || hit.prim_id < rays.hits.prim_id[r]))
+                                       return;
+                                   ray.best_t = rays.hits.t[r] = hit.t;
+                                   rays.hits.u[r] = hit.u;
+                                   rays.hits.v[r] = hit.v;
+                                   rays.hits.prim_id[r] = hit.prim_id;
+                               });
+        }
+    }
+    /// Those that hit a triangle stop looking. Which ones do of those that may is added up, not
+    /// branched on: it is anybody's guess.
+    PACKET_INLINE void occlude(Stream<Isa>& stream, RaySet active, const TriangleBlock& block,
+                               int triangles) const {
+        const StreamRays<Isa>& rays = stream.rays;
+        RaySet hit = 0, open = 0;
+        for (RaySet left = active; left != 0; left &= left - 1) {
+            const int r = __builtin_ctzll(left);
+            stats_.triangles(triangles);
+            const auto sheared =
+                shear<Directions::kShared>(shear_of(rays, r), BlockTriangles{block});
+            const auto candidates = sheared.may_hit();
+            if (none(candidates)) continue;
+            const Occluders found =
+                find_occluders(sheared, candidates, rays.single(r), rays.ray[r].best_t);
+            hit |= RaySet{found.sure != 0} << r;
+            open |= RaySet{found.possible != 0} << r;
+        }
+        for (RaySet left = open & ~hit; left != 0; left &= left - 1) {  // rare
+            const int r = __builtin_ctzll(left);
+            if (is_occluded(shear_of(rays, r), rays.single(r), rays.ray[r].best_t, block)) {
+                hit |= RaySet{1} << r;
+            }
+        }
+        stream.looking &= ~hit;
+    }
+
+    PACKET_INLINE static ShearRays<kBlockSize, Isa> shear_of(const StreamRays<Isa>& rays, int r) {
+        const StreamRay& ray = rays.ray[r];
         ShearRays<kBlockSize, Isa> shear;
         for (int a = 0; a < 3; ++a) {
             shear.org[a] = ray.shear_org[a];
@@ -262,18 +307,7 @@ private:
         }
         shear.shear_x = ray.shear_x;
         shear.shear_y = ray.shear_y;
-        if constexpr (query == Query::kAny) {
-            if (find_occluders(shear, rays.single(r), ray.best_t, block) == 0) return;
-            stream.looking &= ~(RaySet{1} << r);
-        } else {
-            meet_block(shear, rays.single(r), ray.best_t, block, [&](const BlockHit& hit) {
-                if (!(hit.t < ray.best_t || hit.prim_id < rays.hits.prim_id[r])) return;
-                ray.best_t = rays.hits.t[r] = hit.t;
-                rays.hits.u[r] = hit.u;
-                rays.hits.v[r] = hit.v;
-                rays.hits.prim_id[r] = hit.prim_id;
-            });
-        }
+        return shear;
     }
 
     const TreeView& tree_;
