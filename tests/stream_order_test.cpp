@@ -18,12 +18,39 @@ using namespace packet::test;
 
 namespace {
 
+// Tasks are sorted in four pieces, the last ones of which may be shorter, or empty.
+constexpr std::size_t kCounts[] = {
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 777, 4097, StreamOrder::kMostRays - 1, StreamOrder::kMostRays};
+
 int class_of(const Ray& ray) { return direction_class(ray.dir.x, ray.dir.y, ray.dir.z); }
 
 std::vector<std::uint32_t> order_of(std::span<const Ray> rays, int threads) {
     std::vector<std::uint32_t> out(rays.size());
     sort_many(rays, out, 0, Parallel(threads));
     return out;
+}
+
+/// Scattered rays get their own hits, by streams and as `auto` chooses.
+void check_scattered_rays(const Scene& scene) {
+    const std::vector<Ray> rays = random_rays(scene.bounds(), 9 * StreamOrder::kMostRays + 7, 9);
+    std::vector<Hit> want(rays.size()), got(rays.size());
+    std::vector<std::uint8_t> occluded(rays.size());
+    TraceOptions options;
+    options.mode = Mode::kSingle;
+    trace_closest(scene, rays, want, options);
+    for (const Mode mode : {Mode::kStream, Mode::kAuto}) {
+        options.mode = mode;
+        for (options.threads = 1; options.threads <= 2; ++options.threads) {
+            std::ranges::fill(got, Hit{});
+            trace_closest(scene, rays, got, options);
+            CHECK(got == want);
+            std::ranges::fill(occluded, std::uint8_t{2});
+            trace_any(scene, rays, occluded, options);
+            CHECK(std::ranges::equal(
+                occluded, want, {}, [](auto o) { return o != 0; },
+                [](const Hit& hit) { return hit.is_hit(); }));
+        }
+    }
 }
 
 }  // namespace
@@ -44,7 +71,7 @@ TEST_CASE("a direction's class is its octant and longest axis") {
 TEST_CASE("rays are sorted by class, then by origin") {
     const Bounds3f world{{-1, -2, -3}, {4, 1, 2}};
     StreamOrder order;
-    for (const std::size_t count : {std::size_t{1}, std::size_t{777}, StreamOrder::kMostRays}) {
+    for (const std::size_t count : kCounts) {
         const std::vector<Ray> rays = random_rays(world, count, 5);
         const auto sorted = order.sort(rays);
         std::vector<std::uint32_t> all(sorted.begin(), sorted.end()), want(count);
@@ -58,7 +85,7 @@ TEST_CASE("rays are sorted by class, then by origin") {
 
 TEST_CASE("many rays are sorted as few are, by any number of threads") {
     const Bounds3f world{{-1, -2, -3}, {4, 1, 2}};
-    for (const std::size_t count : {std::size_t{0}, std::size_t{1}, StreamOrder::kMostRays}) {
+    for (const std::size_t count : kCounts) {
         const std::vector<Ray> rays = random_rays(world, count, 5);
         StreamOrder order;
         for (const int threads : {1, 2}) {
@@ -74,28 +101,16 @@ TEST_CASE("many rays are sorted as few are, by any number of threads") {
     CHECK(all == want);
 }
 
-TEST_CASE("scattered rays, sorted together, get their own hits") {
-    Scene scene = make_scene(tools::make_city(3000, 3));
-    scene.commit();
-    const std::vector<Ray> rays = random_rays(scene.bounds(), 9 * StreamOrder::kMostRays + 7, 9);
-    std::vector<Hit> want(rays.size()), got(rays.size());
-    std::vector<std::uint8_t> occluded(rays.size());
-    TraceOptions options;
-    options.mode = Mode::kSingle;
-    trace_closest(scene, rays, want, options);
-    for (const Mode mode : {Mode::kStream, Mode::kAuto}) {
-        options.mode = mode;
-        for (options.threads = 1; options.threads <= 2; ++options.threads) {
-            std::ranges::fill(got, Hit{});
-            trace_closest(scene, rays, got, options);
-            CHECK(got == want);
-            std::ranges::fill(occluded, std::uint8_t{2});
-            trace_any(scene, rays, occluded, options);
-            CHECK(std::ranges::equal(
-                occluded, want, {}, [](auto o) { return o != 0; },
-                [](const Hit& hit) { return hit.is_hit(); }));
-        }
-    }
+TEST_CASE("scattered rays, sorted together or, where the tree costs less, by task") {
+    constexpr double kLeastCostTogether = 28.0;  // of schedule/trace_plan.cpp
+    Scene cheap = make_scene(tools::make_city(500, 3));
+    cheap.commit();
+    REQUIRE(cheap.build_stats().sah_cost < kLeastCostTogether);
+    check_scattered_rays(cheap);
+    Scene costly = make_scene(tools::make_soup(3000, 3));
+    costly.commit();
+    REQUIRE(costly.build_stats().sah_cost > kLeastCostTogether);
+    check_scattered_rays(costly);
 }
 
 TEST_CASE("streams that take steps in turn, in a tree beyond the cache, find the same") {
