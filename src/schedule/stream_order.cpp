@@ -90,7 +90,8 @@ class OriginCells {
 public:
     explicit OriginCells(std::span<const Ray> rays) {
         Bounds3f box;
-        for (std::size_t i = 0; i < rays.size(); i += kStride) {
+        const std::size_t stride = std::max(rays.size() / kSamples, std::size_t{1});
+        for (std::size_t i = 0; i < rays.size(); i += stride) {
             const glm::vec3& org = rays[i].org;
             // false for NaN and infinity, which would leave one cell for all others
             if (glm::all(glm::lessThan(glm::abs(org), glm::vec3(kMaxCoordinate)))) box.extend(org);
@@ -110,7 +111,7 @@ public:
 
 private:
     static constexpr int kCells = 1 << kCellBits;
-    static constexpr std::size_t kStride = 16;
+    static constexpr std::size_t kSamples = 256;
 
     /// Along one axis, with room for the bits of the others in between. 0 for NaN.
     [[nodiscard]] Ints cells(Floats x, int axis) const noexcept {
