@@ -95,7 +95,10 @@ TEST_CASE("rays that start or end ever farther away, or never end") {
         for (int i = 0; i < 4 * 256; ++i) {
             const float x = static_cast<float>(i % 16) / 16.0f - 0.5f;
             const float y = static_cast<float>(i / 16 % 16) / 16.0f - 0.5f;
-            const glm::vec3 place = middle + 0.4f * size * (x * side + y * up);
+            // So near each other that they are taken for coherent, and go by tiles if asked to.
+            const auto block = static_cast<float>(rays.size() / 256);
+            const glm::vec3 centre = 0.2f * (std::cos(block) * side + std::sin(block) * up);
+            const glm::vec3 place = middle + size * (centre + 0.1f * (x * side + y * up));
             Ray ray;
             switch (i / 256) {
                 case 0:  // parallel, as to a sun
