@@ -180,6 +180,26 @@ struct Int : LaneValues<Int<N, Isa>, std::int32_t, N, Isa> {
     }
 };
 
+/// Lanes of packets that may have as many as suit the CPU: those of its widest register.
+template <class Isa>
+inline constexpr int kPacketLanes = 8;
+template <>
+inline constexpr int kPacketLanes<isa::Avx512> = 16;
+
+/// One lane of numbers that lie in memory, where it lies there.
+template <int N, class Isa>
+PACKET_INLINE const float& lane_of(const Float<N, Isa>& lanes, int lane) {
+    return reinterpret_cast<const float*>(lanes.r)[lane];
+}
+template <int N, class Isa>
+PACKET_INLINE float& lane_of(Float<N, Isa>& lanes, int lane) {
+    return reinterpret_cast<float*>(lanes.r)[lane];
+}
+template <int N, class Isa>
+PACKET_INLINE std::int32_t& lane_of(Int<N, Isa>& lanes, int lane) {
+    return reinterpret_cast<std::int32_t*>(lanes.r)[lane];
+}
+
 /// Lanes that take several registers, one register of them at a time: what keeps many values alive
 /// spills less so.
 template <int N, class Isa>

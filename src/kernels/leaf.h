@@ -74,8 +74,8 @@ struct BlockHit {
 
 /// A ray meets the triangles of a block, all at once. Those that belong to other leaves are met
 /// along: they are triangles like any other. Calls take(hit) if it hits any.
-template <class Isa, class Take>
-PACKET_INLINE void meet_block(const ShearRays<kBlockSize, Isa>& shear_ray, const SingleRay& ray,
+template <class Isa, class Ray, class Take>
+PACKET_INLINE void meet_block(const ShearRays<kBlockSize, Isa>& shear_ray, const Ray& ray,
                               const float& best_t, const TriangleBlock& block, Take&& take) {
     const BlockTriangles triangles{block};
     const auto sheared = shear<Directions::kShared>(shear_ray, triangles);
@@ -94,9 +94,9 @@ PACKET_INLINE void meet_block(const ShearRays<kBlockSize, Isa>& shear_ray, const
 
 /// Which of `candidates`, triangles of a block, the ray hits, all computed anew: rare, so that
 /// registers need not be kept for it.
-template <class Isa>
-PACKET_NOINLINE std::uint32_t decide_block(const SingleRay& ray, float best_t,
-                                           std::uint32_t candidates, const TriangleBlock& block) {
+template <class Isa, class Ray>
+PACKET_NOINLINE std::uint32_t decide_block(const Ray& ray, float best_t, std::uint32_t candidates,
+                                           const TriangleBlock& block) {
     const BlockTriangles triangles{block};
     return decide_hits(shear<Directions::kShared>(shear_of<kBlockSize, Isa>(ray), triangles),
                        SingleHitRay<kBlockSize, Isa>(ray), Float<kBlockSize, Isa>(best_t),
@@ -110,9 +110,9 @@ struct Occluders {
 };
 
 /// Of `candidates`, triangles that the ray may hit.
-template <class Isa>
+template <class Isa, class Ray>
 PACKET_INLINE Occluders find_occluders(const ShearedTriangles<kBlockSize, Isa>& sheared,
-                                       Mask<kBlockSize, Isa> candidates, const SingleRay& ray,
+                                       Mask<kBlockSize, Isa> candidates, const Ray& ray,
                                        float best_t) {
     const Verdicts<kBlockSize, Isa> verdicts =
         judge(sheared, SingleHitRay<kBlockSize, Isa>(ray), Float<kBlockSize, Isa>(best_t));
@@ -120,8 +120,8 @@ PACKET_INLINE Occluders find_occluders(const ShearedTriangles<kBlockSize, Isa>& 
 }
 
 /// As meet_block(), for any-hit: whether the ray hits a triangle.
-template <class Isa>
-PACKET_INLINE bool is_occluded(const ShearRays<kBlockSize, Isa>& shear_ray, const SingleRay& ray,
+template <class Isa, class Ray>
+PACKET_INLINE bool is_occluded(const ShearRays<kBlockSize, Isa>& shear_ray, const Ray& ray,
                                float best_t, const TriangleBlock& block) {
     const auto sheared = shear<Directions::kShared>(shear_ray, BlockTriangles{block});
     const auto candidates = sheared.may_hit();

@@ -7,13 +7,13 @@
 
 namespace packet {
 
-/// The rays of a packet and their best hits.
-template <Query query, int N, class Isa>
+/// The rays of a packet, which ray_of(lane) picks, and their best hits.
+template <Query query, int N, class Isa, class RayOf>
 class LoneLanes {
 public:
-    PACKET_INLINE LoneLanes(const TreeView& tree, const PreparedLanes* lanes,
-                            std::int32_t instance_id, BestHits<N, Isa>& best)
-        : tree_(tree), lanes_(lanes), instance_id_(instance_id), best_(best) {
+    PACKET_INLINE LoneLanes(const TreeView& tree, RayOf ray_of, std::int32_t instance_id,
+                            BestHits<N, Isa>& best)
+        : tree_(tree), ray_of_(ray_of), instance_id_(instance_id), best_(best) {
         best.t.store(best_t_);
     }
 
@@ -22,7 +22,7 @@ public:
         for (std::uint32_t left = active.bits(); left != 0; left &= left - 1) {
             const int lane = __builtin_ctz(left);
             if (query == Query::kAny && best_t_[lane] == kNever) continue;
-            meet(block, lane, ray(lane));
+            meet(block, lane, ray_of_(lane));
         }
     }
     /// The lanes of `active` walk the subtree of `child`.
@@ -31,7 +31,7 @@ public:
         for (std::uint32_t left = active.bits(); left != 0; left &= left - 1) {
             const int lane = __builtin_ctz(left);
             if (query == Query::kAny && best_t_[lane] == kNever) continue;
-            const SingleRay alone = ray(lane);
+            const SingleRay alone = ray_of_(lane);
             walk_wide_tree<query, Isa>(
                 tree_, alone, best_t_[lane], stats,
                 [&](std::uint32_t first, std::uint32_t item_count) {
@@ -47,10 +47,8 @@ public:
     }
 
 private:
-    PACKET_INLINE SingleRay ray(int lane) const {
-        return {lanes_[lane / kSingleLanes], lane % kSingleLanes};
-    }
-    PACKET_INLINE void meet(const TriangleBlock& block, int lane, const SingleRay& ray) {
+    template <class Ray>
+    PACKET_INLINE void meet(const TriangleBlock& block, int lane, const Ray& ray) {
         const auto shear = shear_of<kBlockSize, Isa>(ray);
         if constexpr (query == Query::kAny) {
             if (!is_occluded(shear, ray, best_t_[lane], block)) return;
@@ -65,7 +63,7 @@ private:
     }
 
     const TreeView& tree_;
-    const PreparedLanes* lanes_;
+    RayOf ray_of_;
     std::int32_t instance_id_;
     BestHits<N, Isa>& best_;
     float best_t_[N];  ///< as in best_

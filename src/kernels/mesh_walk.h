@@ -67,10 +67,13 @@ private:
             walk.lone_lanes().walk(child, active, walk.stats_);
         }
     };
-    PACKET_INLINE LoneLanes<query, N, Isa> lone_lanes() {
+    PACKET_INLINE auto lone_lanes() {
         if (!are_prepared_) prepare_lanes<N, Isa>(tree_, ray_, lanes_);
         are_prepared_ = true;
-        return {tree_, lanes_, instance_id_, best_};
+        const auto ray_of = [lanes = &lanes_[0]](int lane) {
+            return SingleRay(lanes[lane / kSingleLanes], lane % kSingleLanes);
+        };
+        return LoneLanes<query, N, Isa, decltype(ray_of)>(tree_, ray_of, instance_id_, best_);
     }
 
     const TreeView& tree_;

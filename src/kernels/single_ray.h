@@ -72,33 +72,6 @@ PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLan
     }
 }
 
-/// What the triangle test needs of a packet whose rays share their directions, by lanes from
-/// `first` on.
-template <int N, class Isa>
-PACKET_INLINE void store_lanes(const PreparedRays<N, Isa>& from,
-                               PreparedLanes (&out)[N / kSingleLanes]) {
-    using L = PreparedLanes;
-    float lanes[N];
-    const auto store = [&](const Float<N, Isa>& number, int which) {
-        number.store(lanes);
-        for (int i = 0; i < N; ++i)
-            out[i / kSingleLanes].number[which][i % kSingleLanes] = lanes[i];
-    };
-    store(from.hit.tnear, L::kTnear);
-    store(from.shear.shear_x, L::kShearX);
-    store(from.shear.shear_y, L::kShearY);
-    store(from.hit.scale_z, L::kScaleZ);
-    for (int a = 0; a < 3; ++a) {
-        store(from.shear.org[a], L::kShearOrg + a);
-        store(from.hit.org[0][a], L::kLowerOrg + a);
-        store(from.hit.org[1][a], L::kUpperOrg + a);
-        store(from.hit.reciprocal[a], L::kReciprocal + a);
-        for (PreparedLanes& some : out) {
-            for (int i = 0; i < kSingleLanes; ++i) some.index[L::kAxis + a][i] = from.shear.axis[a];
-        }
-    }
-}
-
 /// The lanes of a packet, some at a time.
 template <int N, class Isa>
 PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<N, Isa>& ray,
@@ -152,7 +125,30 @@ private:
     const std::int32_t* indices_;
 };
 
+/// One of the rays of a packet that share their directions, as far as triangles need it.
+template <int N, class Isa>
+struct PacketRay {
+    const PreparedRays<N, Isa>& packet;
+    int lane;
+
+    PACKET_INLINE const float& operator()(const Float<N, Isa>& lanes) const {
+        return lane_of(lanes, lane);
+    }
+};
+
 /// What moves triangles into the ray's space, the same in all lanes.
+template <int N, class Isa, int M>
+PACKET_INLINE ShearRays<N, Isa> shear_of(const PacketRay<M, Isa>& ray) {
+    const ShearRays<M, Isa>& from = ray.packet.shear;
+    ShearRays<N, Isa> out;
+    for (int a = 0; a < 3; ++a) {
+        out.org[a] = ray(from.org[a]);
+        out.axis[a] = from.axis[a];
+    }
+    out.shear_x = ray(from.shear_x);
+    out.shear_y = ray(from.shear_y);
+    return out;
+}
 template <int N, class Isa>
 PACKET_INLINE ShearRays<N, Isa> shear_of(const SingleRay& ray) {
     using L = PreparedLanes;
@@ -176,6 +172,16 @@ struct SingleHitRay {
     };
     Broadcast tnear, scale_z, org[2][3], reciprocal[3];
 
+    template <int M>
+    PACKET_INLINE explicit SingleHitRay(const PacketRay<M, Isa>& ray)
+        : tnear{&ray(ray.packet.hit.tnear)}, scale_z{&ray(ray.packet.hit.scale_z)} {
+        const HitRays<M, Isa>& from = ray.packet.hit;
+        for (int a = 0; a < 3; ++a) {
+            org[0][a].number = &ray(from.org[0][a]);
+            org[1][a].number = &ray(from.org[1][a]);
+            reciprocal[a].number = &ray(from.reciprocal[a]);
+        }
+    }
     PACKET_INLINE explicit SingleHitRay(const SingleRay& ray)
         : tnear{&ray.number(PreparedLanes::kTnear)}, scale_z{&ray.number(PreparedLanes::kScaleZ)} {
         using L = PreparedLanes;

@@ -9,30 +9,17 @@ namespace packet {
 
 /// Fills a stream with the first `count` rays, which are of one class.
 template <class Isa>
-PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, const RayColumns& rays,
-                               int count) {
+PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, std::int32_t instance_id,
+                               const RayColumns& rays, int count) {
+    constexpr int N = kPacketLanes<Isa>;
     out.rays.active = 0;
-    for (int first = 0; first < count; first += kSingleLanes) {
-        const LoadedRays<kSingleLanes, Isa> loaded(rays.from(first),
-                                                   lanes_below<kSingleLanes>(count, first));
-        out.rays.load(tree, loaded.ray, loaded.active.bits(), first);
+    int p = 0;
+    for (; p * N < count; ++p) {
+        const LoadedRays<N, Isa> loaded(rays.from(p * N), lanes_below<N>(count, p * N));
+        out.rays.load(p, tree, loaded.ray, loaded.active, instance_id);
     }
+    out.rays.bound(p);
     out.looking = out.rays.active;
-}
-
-/// The hits of eight rays.
-template <int kCount, class Isa>
-PACKET_INLINE void store_hits(const StreamHits& hits, int first, std::int32_t instance_id,
-                              HitArrays<kCount, Isa>& out) {
-    using F = Float<kSingleLanes, Isa>;
-    using I = Int<kSingleLanes, Isa>;
-    BestHits<kSingleLanes, Isa> best;
-    best.t = F::load(hits.t + first);
-    best.u = F::load(hits.u + first);
-    best.v = F::load(hits.v + first);
-    best.prim_id = I::load(hits.prim_id + first);
-    best.instance_id = instance_id;
-    store_hits(best, out, first);
 }
 
 /// Streams that take steps in turn: what one of them fetches arrives while the others walk.
@@ -49,7 +36,7 @@ public:
           tree_(*instance.tree),
           instance_id_(static_cast<std::int32_t>(instance.instance_id)),
           stats_(batch.stats),
-          walk_(tree_, stats_) {}
+          walk_(tree_, instance_id_, stats_) {}
 
     /// The rays from `begin` on.
     PACKET_INLINE void trace(std::size_t begin) {
@@ -102,7 +89,7 @@ private:
         turn.count = class_run<kSingleLanes, Isa>(columns.component + 4, most);
         next_ += static_cast<std::size_t>(turn.count);
         prefetch_rays(batch_, next_, kStreamRays);
-        load_stream(turn.stream, tree_, columns, turn.count);
+        load_stream(turn.stream, tree_, instance_id_, columns, turn.count);
         walk_.start(turn.stream, 0, turn.stream.looking);
         return true;
     }
@@ -114,8 +101,9 @@ private:
                 batch_.occluded[at] = static_cast<std::uint8_t>(occluded >> i & 1u);
             }
         } else {
-            for (int i = 0; i < turn.count; i += kSingleLanes) {
-                store_hits(turn.stream.rays.hits, i, instance_id_, hits_);
+            constexpr int N = kPacketLanes<Isa>;
+            for (int p = 0; p * N < turn.count; ++p) {
+                store_hits(turn.stream.rays.best[p], hits_, p * N);
             }
             scatter_hits<query>(batch_, turn.begin, turn.count, hits_);
         }
@@ -148,7 +136,7 @@ void trace_batch_by_streams(const TraceBatch& batch) noexcept {
 template <class Isa, class Stats>
 void trace_any_by_tiles_or_streams(const TraceBatch& batch) noexcept {
     // Measured: docs/benchmarking.md#streams. So few tiles tell nothing yet.
-    constexpr float kLeastUtilization = kTileLanes<Isa> == 16 ? 0.5f : 0.69f;
+    constexpr float kLeastUtilization = kPacketLanes<Isa> == 16 ? 0.5f : 0.69f;
     constexpr std::size_t kTrialRays = 4 * kTileRays;
     const SceneView& scene = *batch.scene;
     if (!scene.is_single_mesh || !scene.instances[0].tree->is_tree()) {

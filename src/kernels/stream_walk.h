@@ -8,15 +8,10 @@
 // Pfreundt, Ebert. Efficient ray tracing kernels for modern CPU architectures. JCGT 2015.
 #pragma once
 
-#include "kernels/leaf.h"
 #include "kernels/prefetch.h"
-#include "kernels/transpose.h"
+#include "kernels/stream_rays.h"
 
 namespace packet {
-
-/// Rays of a stream. Sets of them are words of 64 bits; 32 rays were up to a tenth slower.
-inline constexpr int kStreamRays = 64;
-using RaySet = std::uint64_t;
 
 /// The bits of rays, as sets of them are kept while rays meet a node: for each child of it the
 /// lower halves of the sets of those that meet it, and the upper halves.
@@ -27,77 +22,6 @@ struct RayBits {
         for (int r = 0; r < kStreamRays; ++r) {
             half[r][r / 32] = static_cast<std::int32_t>(1u << r % 32);
             half[r][1 - r / 32] = 0;
-        }
-    }
-};
-
-/// What a ray needs at nodes and to filter triangles: one line of the cache. Planes are numbered in
-/// the order in which the stream's rays meet them, axes in that of its triangle test.
-struct alignas(64) StreamRay {
-    float inv_dir[3], near_shift[3], far_shift[3], tnear;
-    float best_t;
-    float shear_org[3], shear_x, shear_y;
-};
-static_assert(sizeof(StreamRay) == 2 * sizeof(Floats8));
-
-/// What the rays of a stream have found. A prim_id of kNoId: nothing.
-struct StreamHits {
-    alignas(32) float t[kStreamRays];
-    float u[kStreamRays], v[kStreamRays];
-    std::int32_t prim_id[kStreamRays];
-};
-
-/// The rays of a stream, and for closest-hit what they have found.
-template <class Isa>
-struct StreamRays {
-    StreamRay ray[kStreamRays];
-    StreamHits hits;
-    PreparedLanes lanes[kStreamRays / kSingleLanes];
-    int near_side[3] = {0, 0, 0}, axis[3] = {0, 1, 2};  ///< of all
-    RaySet active = 0;
-
-    /// Rays `first` to `first + 8`, of which `used` are usable and of the stream's class.
-    PACKET_INLINE void load(const TreeView& tree, const RayLanes<kSingleLanes, Isa>& rays,
-                            std::uint32_t used, int first) {
-        PreparedLanes& from = lanes[first / kSingleLanes];
-        prepare_lanes(tree, rays, from);
-        if (used != 0) {
-            const SingleRay any_ray(from, __builtin_ctz(used));
-            for (int a = 0; a < 3; ++a) {
-                near_side[a] = any_ray.is_backward(a) ? 1 : 0;
-                axis[a] = any_ray.index(PreparedLanes::kAxis + a);
-            }
-        }
-        active |= RaySet{used} << first;
-        const BestHits<kSingleLanes, Isa> none_yet(rays.tfar,
-                                                   Mask<kSingleLanes, Isa>::from_bits(used));
-        none_yet.t.store(hits.t + first);
-        none_yet.u.store(hits.u + first);
-        none_yet.v.store(hits.v + first);
-        none_yet.prim_id.store(hits.prim_id + first);
-        fill(from, hits.t + first, ray + first);
-    }
-
-    PACKET_INLINE SingleRay single(int r) const {
-        return SingleRay(lanes[r / kSingleLanes], r % kSingleLanes);
-    }
-
-private:
-    /// Columns of eight rays become their rows, in two halves.
-    PACKET_INLINE static void fill(const PreparedLanes& from, const float* best_t, StreamRay* out) {
-        using L = PreparedLanes;
-        const auto row = [&](int number) { return from.number[number]; };
-        const float* const columns[2][8] = {
-            {row(L::kInvDir), row(L::kInvDir + 1), row(L::kInvDir + 2), row(L::kNearShift),
-             row(L::kNearShift + 1), row(L::kNearShift + 2), row(L::kFarShift),
-             row(L::kFarShift + 1)},
-            {row(L::kFarShift + 2), row(L::kTnear), best_t, row(L::kShearOrg),
-             row(L::kShearOrg + 1), row(L::kShearOrg + 2), row(L::kShearX), row(L::kShearY)}};
-        for (int half = 0; half < 2; ++half) {
-            Floats8 rows[8];
-            for (int i = 0; i < 8; ++i) rows[i] = *as_row(columns[half][i]);
-            transpose(rows);
-            for (int i = 0; i < 8; ++i) *(as_row(out + i) + half) = rows[i];
         }
     }
 };
@@ -130,7 +54,8 @@ struct WholeTree {
 template <Query query, class Isa, class Stats>
 class StreamWalk {
 public:
-    PACKET_INLINE StreamWalk(const TreeView& tree, Stats& stats) : tree_(tree), stats_(stats) {}
+    PACKET_INLINE StreamWalk(const TreeView& tree, std::int32_t instance_id, Stats& stats)
+        : tree_(tree), instance_id_(instance_id), stats_(stats) {}
 
     /// Enters the subtree of a node with those of `entering` that are looking.
     PACKET_INLINE void start(Stream<Isa>& stream, std::uint32_t root, RaySet entering) const {
@@ -169,6 +94,14 @@ public:
 private:
     using F = Float<kWideSize, Isa>;
     using I = Int<kWideSize, Isa>;
+    static constexpr int N = kPacketLanes<Isa>;
+    using Lanes = Float<N, Isa>;
+
+    // Fewer rays are not worth asking the beam.
+    static constexpr int kFewestForBoxes = LAB_FEWEST, kFewestForTriangles = LAB_LEAF;
+    // Instructions, about.
+    static constexpr int kPacketMeetsBox = LAB_COST, kRayMeetsBoxes = 28;
+    static constexpr int kPacketMeetsTriangle = LAB_LCOST, kRayMeetsBlock = 55;
 
     /// The planes of a node's children, in the order in which they are met.
     struct NodePlanes {
@@ -196,7 +129,24 @@ private:
     };
 
     PACKET_INLINE void visit(Stream<Isa>& stream, const WideNode& node, RaySet active) const {
-        stats_.visit(__builtin_popcountll(active), __builtin_popcountll(active));
+        const StreamRays<Isa>& rays = stream.rays;
+        const int count = __builtin_popcountll(active);
+        if (count >= kFewestForBoxes && rays.has_beam) {
+            const std::uint32_t children = rays.beam.meets(node);
+            const int packets = rays.packets_of(active);
+            if (__builtin_popcount(children) * packets * kPacketMeetsBox <= count * kRayMeetsBoxes) {
+                stats_.visit(count, packets * N);
+                visit_by_packets(stream, node, children, active);
+                return;
+            }
+        }
+        stats_.visit(count, count);
+        visit_by_rays(stream, node, active);
+    }
+
+    /// Each ray meets all children at once.
+    PACKET_INLINE void visit_by_rays(Stream<Isa>& stream, const WideNode& node,
+                                     RaySet active) const {
         const NodePlanes planes(node, stream.rays.near_side);
         I found[2] = {I(0), I(0)};
         F first_enter(__builtin_huge_valf());
@@ -212,13 +162,7 @@ private:
             }
         }
         const std::uint32_t all = (1u << kWideSize) - 1;
-        push(stream, node, all & ~((found[0] | found[1]) == I(0)).bits(), found, first_enter);
-    }
-
-    /// Pushes the children of `bits`, for closest-hit the one that is entered first last. Any-hit
-    /// takes them as they come.
-    PACKET_INLINE void push(Stream<Isa>& stream, const WideNode& node, std::uint32_t bits,
-                            const I (&found)[2], const F& first_enter) const {
+        std::uint32_t bits = all & ~((found[0] | found[1]) == I(0)).bits();
         if (bits == 0) return;
         std::int32_t half[2][kWideSize];
         found[0].store(half[0]), found[1].store(half[1]);
@@ -229,46 +173,113 @@ private:
             const int child = __builtin_ctz(bits);
             const RaySet set = static_cast<std::uint32_t>(half[0][child]) |
                                RaySet{static_cast<std::uint32_t>(half[1][child])} << 32;
-            prefetch(tree_, node.child[child]);
-            int place = stream.size++;
-            if constexpr (query == Query::kClosest) {
-                for (; place > bottom && stream.stack[place - 1].enter < enter[child]; --place) {
-                    stream.stack[place] = stream.stack[place - 1];
+            push(stream, bottom, {node.child[child], set, enter[child]});
+        }
+    }
+    /// Each packet of rays meets one child after the other, of those that the beam meets.
+    PACKET_INLINE void visit_by_packets(Stream<Isa>& stream, const WideNode& node,
+                                        std::uint32_t children, RaySet active) const {
+        const StreamRays<Isa>& rays = stream.rays;
+        const int bottom = stream.size;
+        for (; children != 0; children &= children - 1) {
+            const int child = __builtin_ctz(children);
+            const BoxPlanes<Directions::kShared, N, Isa> planes(node, child, rays.near_side);
+            RaySet set = 0;
+            Lanes first_enter(__builtin_huge_valf());
+            for (int p = 0; p < rays.kPackets; ++p) {
+                const std::uint32_t some = rays.part(active, p);
+                if (some == 0) continue;
+                const Interval<N, Isa> box = planes.slabs(rays.packet[p]);
+                const std::uint32_t met =
+                    meets(rays.packet[p], box, rays.best[p].t).bits() & some;
+                set |= RaySet{met} << p * N;
+                if constexpr (query == Query::kClosest) {
+                    const Lanes enter = max(box.enter, rays.packet[p].hit.tnear);
+                    first_enter = select(Mask<N, Isa>::from_bits(met), min(enter, first_enter),
+                                         first_enter);
                 }
             }
-            stream.stack[place] = {node.child[child], set, enter[child]};
+            if (set == 0) continue;
+            const float enter = query == Query::kClosest ? smallest_lane(first_enter) : 0.0f;
+            push(stream, bottom, {node.child[child], set, enter});
         }
+    }
+
+    /// Pushes a child, for closest-hit after those of its node, from `bottom` on, that are entered
+    /// later. Any-hit takes them as they come.
+    PACKET_INLINE void push(Stream<Isa>& stream, int bottom, const StreamEntry& entry) const {
+        prefetch(tree_, entry.child);
+        int place = stream.size++;
+        if constexpr (query == Query::kClosest) {
+            for (; place > bottom && stream.stack[place - 1].enter < entry.enter; --place) {
+                stream.stack[place] = stream.stack[place - 1];
+            }
+        }
+        stream.stack[place] = entry;
     }
 
     PACKET_INLINE void meet_leaf(Stream<Isa>& stream, BlockRange range, RaySet active,
                                  float enter) const {
+        const StreamRays<Isa>& rays = stream.rays;
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            const int triangles = __builtin_popcount(range.lanes(b));
+            const TriangleBlock& block = tree_.blocks[b];
+            const std::uint32_t lanes = range.lanes(b);
+            if constexpr (query == Query::kAny) active &= stream.looking;
+            const int count = __builtin_popcountll(active);
+            if (count >= kFewestForTriangles && rays.has_beam) {
+                const std::uint32_t triangles = lanes & rays.beam.meets(block);
+                if (__builtin_popcount(triangles) * rays.packets_of(active) * kPacketMeetsTriangle <=
+                    count * kRayMeetsBlock) {
+                    meet_by_packets(stream, block, triangles, active, enter);
+                    continue;
+                }
+            }
             if constexpr (query == Query::kAny) {
-                occlude(stream, active & stream.looking, tree_.blocks[b], triangles);
+                occlude(stream, active, block, __builtin_popcount(lanes));
             } else {
-                meet_block(stream, active, enter, tree_.blocks[b], triangles);
+                meet_block(stream, active, enter, block, __builtin_popcount(lanes));
             }
         }
     }
 
+    /// Each packet of rays meets one triangle after the other.
+    PACKET_INLINE void meet_by_packets(Stream<Isa>& stream, const TriangleBlock& block,
+                                       std::uint32_t triangles, RaySet active, float enter) const {
+        if (triangles == 0) return;
+        StreamRays<Isa>& rays = stream.rays;
+        for (int p = 0; p < rays.kPackets; ++p) {
+            const std::uint32_t some = rays.part(active, p);
+            if (some == 0) continue;
+            BestHits<N, Isa>& best = rays.best[p];
+            const Lanes former_t = best.t;
+            auto mask = Mask<N, Isa>::from_bits(some);
+            if constexpr (query == Query::kClosest) mask = mask & (Lanes(enter) <= former_t);
+            stats_.triangles(count(mask) * __builtin_popcount(triangles));
+            const PacketLeaf<query, Directions::kShared, N, Isa> leaf{rays.packet[p], rays.axis,
+                                                                      instance_id_, best};
+            for (std::uint32_t left = triangles; left != 0; left &= left - 1) {
+                leaf.meet(block, __builtin_ctz(left), mask);
+            }
+            const std::uint32_t hit = (best.t < former_t).bits();
+            if constexpr (query == Query::kAny) {
+                stream.looking &= ~(RaySet{hit} << p * N);
+            } else {
+                rays.update_best_t(p, hit);
+            }
+        }
+    }
+
+    /// Each ray meets all triangles at once.
     PACKET_INLINE void meet_block(Stream<Isa>& stream, RaySet active, float enter,
                                   const TriangleBlock& block, int triangles) const {
         StreamRays<Isa>& rays = stream.rays;
         for (RaySet left = active; left != 0; left &= left - 1) {
             const int r = __builtin_ctzll(left);
-            StreamRay& ray = rays.ray[r];
+            const StreamRay& ray = rays.ray[r];
             if (enter > ray.best_t) continue;
             stats_.triangles(triangles);
-            packet::meet_block(shear_of(rays, r), rays.single(r), ray.best_t, block,
-                               [&](const BlockHit& hit) {
-                                   if (!(hit.t < ray.best_t || hit.prim_id < rays.hits.prim_id[r]))
-                                       return;
-                                   ray.best_t = rays.hits.t[r] = hit.t;
-                                   rays.hits.u[r] = hit.u;
-                                   rays.hits.v[r] = hit.v;
-                                   rays.hits.prim_id[r] = hit.prim_id;
-                               });
+            packet::meet_block(shear_of(rays, r), rays.one(r), ray.best_t, block,
+                               [&](const BlockHit& hit) { rays.update(r, hit); });
         }
     }
     /// Those that hit a triangle stop looking. Which ones do of those that may is added up, not
@@ -285,13 +296,13 @@ private:
             const auto candidates = sheared.may_hit();
             if (none(candidates)) continue;
             const Occluders found =
-                find_occluders(sheared, candidates, rays.single(r), rays.ray[r].best_t);
+                find_occluders(sheared, candidates, rays.one(r), rays.ray[r].best_t);
             hit |= RaySet{found.sure != 0} << r;
             open |= RaySet{found.possible != 0} << r;
         }
         for (RaySet left = open & ~hit; left != 0; left &= left - 1) {  // rare
             const int r = __builtin_ctzll(left);
-            if (is_occluded(shear_of(rays, r), rays.single(r), rays.ray[r].best_t, block)) {
+            if (is_occluded(shear_of(rays, r), rays.one(r), rays.ray[r].best_t, block)) {
                 hit |= RaySet{1} << r;
             }
         }
@@ -311,6 +322,7 @@ private:
     }
 
     const TreeView& tree_;
+    std::int32_t instance_id_;
     Stats& stats_;
     const RayBits bits_;
 };

@@ -19,11 +19,6 @@ namespace packet {
 inline constexpr int kTileRays = 128;
 template <int N>
 inline constexpr int kTilePackets = kTileRays / N;
-/// Lanes of its packets: those of the widest register.
-template <class Isa>
-inline constexpr int kTileLanes = 8;
-template <>
-inline constexpr int kTileLanes<isa::Avx512> = 16;
 
 /// A child to visit, and the packets that have met its parent.
 struct TileEntry {
@@ -205,11 +200,11 @@ private:
 
     /// The active rays of a packet meet a block one by one, each all of its triangles at once.
     PACKET_NOINLINE void meet_by_rays(const TriangleBlock& block, int p) {
-        if ((stored_ >> p & 1u) == 0) {
-            stored_ |= 1u << p;
-            store_lanes(rays_[p], lanes_[p]);
-        }
-        LoneLanes<query, N, Isa>(tree_, lanes_[p], instance_id_, best_[p]).meet(block, active_[p]);
+        const auto ray_of = [packet = &rays_[p]](int lane) {
+            return PacketRay<N, Isa>{*packet, lane};
+        };
+        LoneLanes<query, N, Isa, decltype(ray_of)>(tree_, ray_of, instance_id_, best_[p])
+            .meet(block, active_[p]);
     }
 
     const TreeView& tree_;
@@ -225,8 +220,6 @@ private:
     Stats& stats_;
     std::uint32_t looking_ = 0;  ///< packets that may still find something
     M active_[kTilePackets<N>];
-    std::uint32_t stored_ = 0;  ///< packets whose lanes are in lanes_
-    PreparedLanes lanes_[kTilePackets<N>][N / kSingleLanes];
     int size_ = 0;
     TileEntry stack_[kMaxDepth * (kWideSize - 1) + kWideSize];
 };

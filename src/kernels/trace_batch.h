@@ -304,7 +304,7 @@ public:
     }
 
 private:
-    static constexpr int N = kTileLanes<Isa>;
+    static constexpr int N = kPacketLanes<Isa>;
 
     PACKET_INLINE void trace_rays(std::size_t begin, int count) {
         const RayColumns columns = gather_rays(batch_, begin, count, rays_);
@@ -356,7 +356,7 @@ void trace_batch_by_tiles(const TraceBatch& batch) noexcept {
     if (scene.is_single_mesh && scene.instances[0].tree->is_tree()) {
         TileBatch<query, Isa, Stats>(batch).trace();
     } else {
-        trace_batch_by_packets<query, kTileLanes<Isa>, Isa, Stats>(batch);
+        trace_batch_by_packets<query, kPacketLanes<Isa>, Isa, Stats>(batch);
     }
 }
 

@@ -29,7 +29,7 @@ public:
           tree_(*instance.tree),
           instance_id_(static_cast<std::int32_t>(instance.instance_id)),
           stats_(batch.rays.stats),
-          walk_(tree_, stats_) {}
+          walk_(tree_, instance_id_, stats_) {}
 
     PACKET_INLINE void run() {
         const std::size_t all = batch_.rays.count;
@@ -48,14 +48,13 @@ public:
 
 private:
     PACKET_INLINE void load(const RayColumns& columns, std::size_t begin, int count) {
-        load_stream(stream_, tree_, columns, count);
+        load_stream(stream_, tree_, instance_id_, columns, count);
         stats_.treelet_stream(count);
         begin_ = begin;
         if (batch_.best_t == nullptr) return;
         for (int r = 0; r < count; ++r) {
             const std::int32_t prim_id = batch_.prim_id[begin + static_cast<std::size_t>(r)];
-            if (prim_id < 0) continue;
-            stream_.rays.hits.prim_id[r] = prim_id;
+            if (prim_id >= 0) stream_.rays.set_prim_id(r, prim_id);
         }
     }
 
@@ -88,10 +87,12 @@ private:
         }
     }
 
-    PACKET_INLINE void write_hit(int r, Hit& out) const {
-        const StreamHits& hits = stream_.rays.hits;
-        out.t = hits.t[r], out.u = hits.u[r], out.v = hits.v[r];
-        out.prim_id = static_cast<std::uint32_t>(hits.prim_id[r]);
+    PACKET_INLINE void write_hit(int r, Hit& out) {
+        constexpr int N = kPacketLanes<Isa>;
+        const BestHits<N, Isa>& best = stream_.rays.best[r / N];
+        out.t = lane_of(best.t, r % N);
+        out.u = lane_of(best.u, r % N), out.v = lane_of(best.v, r % N);
+        out.prim_id = static_cast<std::uint32_t>(stream_.rays.prim_id(r));
         out.mesh_id = mesh_of(*batch_.rays.scene, instance_id_);
         out.instance_id = static_cast<std::uint32_t>(instance_id_);
     }
@@ -108,7 +109,7 @@ private:
         for (int r = 0; r < count; ++r) {
             const std::size_t at = begin + static_cast<std::size_t>(r);
             const std::int32_t had = batch_.best_t != nullptr ? batch_.prim_id[at] : -1;
-            const std::int32_t has = stream_.rays.hits.prim_id[r];
+            const std::int32_t has = stream_.rays.prim_id(r);
             if (has != kNoId && has != had) write_hit(r, batch_.rays.hits[batch_.rays.order[at]]);
         }
     }
