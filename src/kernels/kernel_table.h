@@ -77,8 +77,7 @@ struct KernelTable {
     using Overlap = std::uint32_t (*)(const float (&triangle)[3][3], const float (&lower)[3][32],
                                       const float (&upper)[3][32], int count) noexcept;
 
-    /// kSorted: as kStream; any-hit rays go by tiles where these are full.
-    enum Kernel { kSingle, kPacket8, kPacket16, kTile, kStream, kSorted, kKernelCount };
+    enum Kernel { kSingle, kPacket8, kPacket16, kTile, kStream, kKernelCount };
     enum Counting { kNotCounting, kCounting, kCountingCount };
 
     Batch closest[kKernelCount][kCountingCount];

@@ -20,11 +20,6 @@ constexpr KernelTable make_kernel_table() {
         kernels[KernelTable::kPacket16][counting] = trace_batch_by_packets<query, 16, Isa, Stats>;
         kernels[KernelTable::kStream][counting] = trace_batch_by_streams<query, Isa, Stats>;
         kernels[KernelTable::kTile][counting] = trace_batch_by_tiles<query, Isa, Stats>;
-        if constexpr (query == Query::kAny) {
-            kernels[KernelTable::kSorted][counting] = trace_any_by_tiles_or_streams<Isa, Stats>;
-        } else {
-            kernels[KernelTable::kSorted][counting] = kernels[KernelTable::kStream][counting];
-        }
     };
     using KT = KernelTable;
     fill.template operator()<Query::kClosest, NoCounters>(table.closest, KT::kNotCounting);

@@ -38,9 +38,7 @@ public:
           stats_(batch.stats),
           walk_(tree_, instance_id_, stats_) {}
 
-    /// The rays from `begin` on.
-    PACKET_INLINE void trace(std::size_t begin) {
-        next_ = begin;
+    PACKET_INLINE void trace() {
         if (tree_.byte_count < kLeastBytesForTurns) {
             trace_one_by_one();
         } else {
@@ -125,32 +123,9 @@ template <Query query, class Isa, class Stats>
 void trace_batch_by_streams(const TraceBatch& batch) noexcept {
     const SceneView& scene = *batch.scene;
     if (scene.is_single_mesh && scene.instances[0].tree->is_tree()) {
-        StreamBatch<query, Isa, Stats>(batch, scene.instances[0]).trace(0);
+        StreamBatch<query, Isa, Stats>(batch, scene.instances[0]).trace();
     } else {
         trace_batch_singly<query, Isa, Stats>(batch);
-    }
-}
-
-/// Rays in the order of streams, which are often as near as those of a tile, such as shadow rays to
-/// one light. Tiles as long as they find their packets full, streams from there on.
-template <class Isa, class Stats>
-void trace_any_by_tiles_or_streams(const TraceBatch& batch) noexcept {
-    // Measured: docs/benchmarking.md#streams. So few tiles tell nothing yet.
-    constexpr float kLeastUtilization = kPacketLanes<Isa> == 16 ? 0.5f : 0.69f;
-    constexpr std::size_t kTrialRays = 4 * kTileRays;
-    const SceneView& scene = *batch.scene;
-    if (!scene.is_single_mesh || !scene.instances[0].tree->is_tree()) {
-        trace_batch_singly<Query::kAny, Isa, Stats>(batch);
-        return;
-    }
-    TileBatch<Query::kAny, Isa, Stats> tiles(batch);
-    std::size_t begin = 0;
-    while (begin < batch.count) {
-        if (begin >= kTrialRays && tiles.utilization() < kLeastUtilization) break;
-        begin = tiles.trace_tile_at(begin);
-    }
-    if (begin < batch.count) {
-        StreamBatch<Query::kAny, Isa, Stats>(batch, scene.instances[0]).trace(begin);
     }
 }
 

@@ -1,5 +1,5 @@
-// The rays of a stream, laid out for both ways in which they meet a tree: each in a line of its own,
-// to meet eight boxes or triangles at once, and in packets, many of which meet one.
+// The rays of a stream, laid out for both ways in which they meet a tree: each in a line of its
+// own, to meet eight boxes or triangles at once, and in packets, many of which meet one.
 #pragma once
 
 #include "kernels/beam.h"
@@ -30,8 +30,8 @@ struct StreamRays {
     StreamRay ray[kStreamRays];
     PreparedRays<N, Isa> packet[kPackets];
     BestHits<N, Isa> best[kPackets];
-    Beam<Isa> beam;                                 ///< around all of them
-    bool has_beam = false;                          ///< else there is none
+    Beam<Isa> beam;                                     ///< around all of them
+    bool has_beam = false;                              ///< else there is none
     int near_side[3] = {0, 0, 0}, axis[3] = {0, 1, 2};  ///< of all
     RaySet active = 0;
 
@@ -70,9 +70,7 @@ struct StreamRays {
         return out;
     }
 
-    PACKET_INLINE std::int32_t prim_id(int r) {
-        return lane_of(best[r / N].prim_id, r % N);
-    }
+    PACKET_INLINE std::int32_t prim_id(int r) { return lane_of(best[r / N].prim_id, r % N); }
     PACKET_INLINE void set_prim_id(int r, std::int32_t id) {
         lane_of(best[r / N].prim_id, r % N) = id;
         lane_of(best[r / N].tie_prim_id, r % N) = id;

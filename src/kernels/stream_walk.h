@@ -97,11 +97,16 @@ private:
     static constexpr int N = kPacketLanes<Isa>;
     using Lanes = Float<N, Isa>;
 
-    // Fewer rays are not worth asking the beam.
-    static constexpr int kFewestForBoxes = LAB_FEWEST, kFewestForTriangles = LAB_LEAF;
-    // Instructions, about.
-    static constexpr int kPacketMeetsBox = LAB_COST, kRayMeetsBoxes = 28;
-    static constexpr int kPacketMeetsTriangle = LAB_LCOST, kRayMeetsBlock = 55;
+    // Fewer rays are not worth asking the beam. Measured: docs/benchmarking.md#streams.
+    static constexpr int kFewestForBoxes = kStreamRays / 2 + 1;
+    static constexpr int kFewestForTriangles = kStreamRays / 4 + 1;
+
+    /// Whether packets had better meet so many boxes or triangles one by one than each of the rays
+    /// all of them at once: a packet and one take about as long as a ray and eight.
+    PACKET_INLINE static bool is_for_packets(RaySet active, std::uint32_t items) {
+        return __builtin_popcount(items) * StreamRays<Isa>::packets_of(active) <=
+               __builtin_popcountll(active);
+    }
 
     /// The planes of a node's children, in the order in which they are met.
     struct NodePlanes {
@@ -133,9 +138,8 @@ private:
         const int count = __builtin_popcountll(active);
         if (count >= kFewestForBoxes && rays.has_beam) {
             const std::uint32_t children = rays.beam.meets(node);
-            const int packets = rays.packets_of(active);
-            if (__builtin_popcount(children) * packets * kPacketMeetsBox <= count * kRayMeetsBoxes) {
-                stats_.visit(count, packets * N);
+            if (is_for_packets(active, children)) {
+                stats_.visit(count, rays.packets_of(active) * N);
                 visit_by_packets(stream, node, children, active);
                 return;
             }
@@ -190,13 +194,12 @@ private:
                 const std::uint32_t some = rays.part(active, p);
                 if (some == 0) continue;
                 const Interval<N, Isa> box = planes.slabs(rays.packet[p]);
-                const std::uint32_t met =
-                    meets(rays.packet[p], box, rays.best[p].t).bits() & some;
+                const std::uint32_t met = meets(rays.packet[p], box, rays.best[p].t).bits() & some;
                 set |= RaySet{met} << p * N;
                 if constexpr (query == Query::kClosest) {
                     const Lanes enter = max(box.enter, rays.packet[p].hit.tnear);
-                    first_enter = select(Mask<N, Isa>::from_bits(met), min(enter, first_enter),
-                                         first_enter);
+                    first_enter =
+                        select(Mask<N, Isa>::from_bits(met), min(enter, first_enter), first_enter);
                 }
             }
             if (set == 0) continue;
@@ -225,11 +228,9 @@ private:
             const TriangleBlock& block = tree_.blocks[b];
             const std::uint32_t lanes = range.lanes(b);
             if constexpr (query == Query::kAny) active &= stream.looking;
-            const int count = __builtin_popcountll(active);
-            if (count >= kFewestForTriangles && rays.has_beam) {
+            if (__builtin_popcountll(active) >= kFewestForTriangles && rays.has_beam) {
                 const std::uint32_t triangles = lanes & rays.beam.meets(block);
-                if (__builtin_popcount(triangles) * rays.packets_of(active) * kPacketMeetsTriangle <=
-                    count * kRayMeetsBlock) {
+                if (is_for_packets(active, triangles)) {
                     meet_by_packets(stream, block, triangles, active, enter);
                     continue;
                 }

@@ -20,7 +20,6 @@ struct TileTracer {
     const PreparedRays<N, Isa>* rays;
     BestHits<N, Isa>* best;
     std::uint32_t active;  ///< packets with a lane to trace
-    TileUse& use;
     Stats& stats;
     Alone& alone;  ///< traces one packet
 
@@ -58,7 +57,7 @@ private:
         const bool is_narrow = bounds.width(length < way ? length : way) <= kWidestBeam * way;
         if (!bounds.is_sound || !is_narrow) return false;
         TileWalk<query, N, Isa, Stats> walk(tree, rays + first, best + first, last - first, bounds,
-                                            instance_id, use, stats);
+                                            instance_id, stats);
         const std::uint32_t all = (1u << (last - first)) - 1;
         walk.run(active >> first & all);
         return true;

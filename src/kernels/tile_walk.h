@@ -28,11 +28,6 @@ struct TileEntry {
     float depth;
 };
 
-/// How full the packets of tiles are where they meet boxes: whether walking in tiles pays.
-struct TileUse {
-    std::uint32_t packets = 0, lanes = 0;
-};
-
 /// The packets of a tile that walk together. Their directions are shared.
 template <Query query, int N, class Isa, class Stats>
 class TileWalk {
@@ -42,14 +37,13 @@ public:
 
     PACKET_INLINE TileWalk(const TreeView& tree, const PreparedRays<N, Isa>* rays,
                            BestHits<N, Isa>* best, int packet_count, const BeamBounds& bounds,
-                           std::int32_t instance_id, TileUse& use, Stats& stats)
+                           std::int32_t instance_id, Stats& stats)
         : tree_(tree),
           rays_(rays),
           best_(best),
           beam_(bounds),
           slopes_(bounds, rays, best, packet_count),
           instance_id_(instance_id),
-          use_(use),
           stats_(stats) {
         has_origin_ = bounds.has_origin;
         for (int a = 0; a < 3; ++a) {
@@ -119,16 +113,11 @@ private:
                 return left;
             }
             // No branch from here on: which packets meet a box is anybody's guess.
-            const auto lanes = static_cast<std::uint32_t>(count(active));
-            const std::uint32_t is_met = lanes != 0 ? 1 : 0;
+            const std::uint32_t is_met = any(active) ? 1 : 0;
             if constexpr (Stats::kCounts) {
                 if (!is_leaf && is_met != 0) stats_.visit(count(active), N);
             }
             active_[p] = active;
-            if constexpr (query == Query::kAny) {
-                use_.lanes += lanes;
-                use_.packets += is_met;
-            }
             out |= is_met << p;
         }
         return out;
@@ -216,7 +205,6 @@ private:
     bool has_origin_;             ///< all start at origin_
     float origin_[3];
     std::int32_t instance_id_;
-    TileUse& use_;  ///< counted for any-hit
     Stats& stats_;
     std::uint32_t looking_ = 0;  ///< packets that may still find something
     M active_[kTilePackets<N>];

@@ -105,7 +105,7 @@ PACKET_INLINE std::uint32_t lanes_below(int count, int first) {
 
 template <Query query, int N, class Isa, class Stats>
 PACKET_INLINE void trace_tile(const SceneView& scene, const RayColumns& rays, int count,
-                              TileUse& use, Stats& stats, HitArrays<kTileRays, Isa>& out) {
+                              Stats& stats, HitArrays<kTileRays, Isa>& out) {
     const TreeView& tree = *scene.instances[0].tree;
     const auto instance_id = static_cast<std::int32_t>(scene.instances[0].instance_id);
     PreparedRays<N, Isa> prepared[kTilePackets<N>];
@@ -125,7 +125,7 @@ PACKET_INLINE void trace_tile(const SceneView& scene, const RayColumns& rays, in
         trace_packet<query, N>(scene, rays, lanes_below<N>(count, p * N), stats, out, p * N);
     };
     TileTracer<query, N, Isa, Stats, decltype(alone)> tracer{tree,   instance_id, prepared, best,
-                                                             active, use,         stats,    alone};
+                                                             active, stats,       alone};
     tracer.trace(0, kTilePackets<N>);
     for (int p = 0; p * N < count; ++p) {
         if ((done >> p & 1u) == 0) store_hits(best[p], out, p * N);
@@ -287,20 +287,10 @@ public:
         : batch_(batch), stats_(batch.stats) {}
 
     PACKET_INLINE void trace() {
-        for (std::size_t begin = 0; begin < batch_.count;) begin = trace_tile_at(begin);
-    }
-    /// Traces the rays from `begin` on that make a tile, and returns where the next one begins.
-    PACKET_INLINE std::size_t trace_tile_at(std::size_t begin) {
-        const std::size_t left = batch_.count - begin;
-        const std::size_t count = left < kTileRays ? left : kTileRays;
-        trace_rays(begin, static_cast<int>(count));
-        return begin + count;
-    }
-    /// The share of lanes that are active where packets meet boxes, so far.
-    [[nodiscard]] PACKET_INLINE float utilization() const {
-        return use_.packets == 0 ? 1.0f
-                                 : static_cast<float>(use_.lanes) /
-                                       (static_cast<float>(N) * static_cast<float>(use_.packets));
+        for (std::size_t begin = 0; begin < batch_.count; begin += kTileRays) {
+            const std::size_t left = batch_.count - begin;
+            trace_rays(begin, left < kTileRays ? static_cast<int>(left) : kTileRays);
+        }
     }
 
 private:
@@ -310,7 +300,7 @@ private:
         const RayColumns columns = gather_rays(batch_, begin, count, rays_);
         prefetch_rays(batch_, begin + static_cast<std::size_t>(count), kTileRays);
         if (class_run<N, Isa>(columns.component + 4, count) == count) {
-            trace_tile<query, N>(*batch_.scene, columns, count, use_, stats_, hits_);
+            trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_);
             scatter_hits<query>(batch_, begin, count, hits_);
             return;
         }
@@ -338,13 +328,12 @@ private:
             TraceBatch run = batch_;
             run.order = order + runs.begin[c];
             const RayColumns columns = gather_rays(run, 0, count, rays_);
-            trace_tile<query, N>(*batch_.scene, columns, count, use_, stats_, hits_);
+            trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_);
             scatter_hits<query>(run, 0, count, hits_);
         }
     }
 
     const TraceBatch& batch_;
-    TileUse use_;
     Stats stats_;
     RayArrays<kTileRays, Isa> rays_ = {};
     HitArrays<kTileRays, Isa> hits_;

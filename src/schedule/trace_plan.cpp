@@ -79,7 +79,7 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
     const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
     if (is_coherent) {
         if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles();
-        return {KernelTable::kSorted, Sorting::kByTask};
+        return {KernelTable::kStream, Sorting::kByTask};
     }
     if (has_treelets(scene.view) && rays.size() >= kLeastRaysTogether &&
         sweeps_beat_streams(rays.size(), scene.view.instances[0].tree->byte_count,
