@@ -81,20 +81,6 @@ PACKET_INLINE void smallest_lanes(const Float<N, Isa> (&in)[8], float (&out)[8])
     column[0].store(out);
 }
 
-template <int N, class Isa>
-PACKET_INLINE float smallest_lane(const Float<N, Isa>& in) {
-    static_assert(N % 8 == 0);
-    float lanes[N];
-    in.store(lanes);
-    Floats8 least = *as_row(lanes);
-    const auto shrink = [&](const Floats8& other) { least = other < least ? other : least; };
-    for (int k = 8; k < N; k += 8) shrink(*as_row(lanes + k));
-    shrink(__builtin_shufflevector(least, least, 4, 5, 6, 7, 0, 1, 2, 3));
-    shrink(__builtin_shufflevector(least, least, 2, 3, 0, 1, 6, 7, 4, 5));
-    shrink(__builtin_shufflevector(least, least, 1, 0, 3, 2, 5, 4, 7, 6));
-    return least[0];
-}
-
 /// Bounds the active lanes (best.t > kNever) of packets that share their directions.
 template <int N, class Isa>
 class BeamBuilder {

@@ -8,7 +8,7 @@
 namespace packet {
 
 /// Fills a stream with the first `count` rays, which are of one class.
-template <class Isa>
+template <Query query, class Isa>
 PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, std::int32_t instance_id,
                                const RayColumns& rays, int count) {
     constexpr int N = kPacketLanes<Isa>;
@@ -18,7 +18,7 @@ PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, std::int3
         const LoadedRays<N, Isa> loaded(rays.from(p * N), lanes_below<N>(count, p * N));
         out.rays.load(p, tree, loaded.ray, loaded.active, instance_id);
     }
-    out.rays.bound(p);
+    if constexpr (query == Query::kAny) out.rays.bound(p);
     out.looking = out.rays.active;
 }
 
@@ -36,7 +36,7 @@ public:
           tree_(*instance.tree),
           instance_id_(static_cast<std::int32_t>(instance.instance_id)),
           stats_(batch.stats),
-          walk_(tree_, instance_id_, stats_) {}
+          walk_(tree_, stats_) {}
 
     PACKET_INLINE void trace() {
         if (tree_.byte_count < kLeastBytesForTurns) {
@@ -87,7 +87,7 @@ private:
         turn.count = class_run<kSingleLanes, Isa>(columns.component + 4, most);
         next_ += static_cast<std::size_t>(turn.count);
         prefetch_rays(batch_, next_, kStreamRays);
-        load_stream(turn.stream, tree_, instance_id_, columns, turn.count);
+        load_stream<query>(turn.stream, tree_, instance_id_, columns, turn.count);
         walk_.start(turn.stream, 0, turn.stream.looking);
         return true;
     }

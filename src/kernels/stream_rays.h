@@ -84,13 +84,6 @@ struct StreamRays {
         lane_of(to.v, r % N) = hit.v;
         set_prim_id(r, hit.prim_id);
     }
-    /// After rays of packet p may have hit something.
-    PACKET_INLINE void update_best_t(int p, std::uint32_t lanes) {
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const int lane = __builtin_ctz(lanes);
-            ray[p * N + lane].best_t = lane_of(best[p].t, lane);
-        }
-    }
 
 private:
     /// Columns of eight rays, from `lane` on, become their rows, in two halves.

@@ -1,8 +1,10 @@
-// Walks the 8-wide form of a tree with a stream: up to 64 rays of one class, not close enough to
-// share a beam or a packet. They share the stack: an entry is a subtree and the set of rays that
-// meet it, so a node is fetched once for all of them, and its planes stay in registers while ray
-// after ray meets its 8 children, without a branch. Single rays mispredict about two branches a
-// node, rays of a stream less than one.
+// Walks the 8-wide form of a tree with a stream: up to 64 rays of one class, which need not be near
+// each other. They share the stack: an entry is a subtree and the set of rays that meet it, so a
+// node is fetched once for all of them, and its planes stay in registers while ray after ray meets
+// its 8 children, without a branch. Single rays mispredict about two branches a node, rays of a
+// stream less than one. Where most of an any-hit stream's rays meet a node or a block of triangles,
+// they meet its items one after the other instead, in packets, as far as a beam around all of them
+// does.
 //
 // Barringer, Akenine-Moller. Dynamic ray stream traversal. TOG 2014. Fuetterling, Lojewski,
 // Pfreundt, Ebert. Efficient ray tracing kernels for modern CPU architectures. JCGT 2015.
@@ -54,8 +56,7 @@ struct WholeTree {
 template <Query query, class Isa, class Stats>
 class StreamWalk {
 public:
-    PACKET_INLINE StreamWalk(const TreeView& tree, std::int32_t instance_id, Stats& stats)
-        : tree_(tree), instance_id_(instance_id), stats_(stats) {}
+    PACKET_INLINE StreamWalk(const TreeView& tree, Stats& stats) : tree_(tree), stats_(stats) {}
 
     /// Enters the subtree of a node with those of `entering` that are looking.
     PACKET_INLINE void start(Stream<Isa>& stream, std::uint32_t root, RaySet entering) const {
@@ -136,12 +137,14 @@ private:
     PACKET_INLINE void visit(Stream<Isa>& stream, const WideNode& node, RaySet active) const {
         const StreamRays<Isa>& rays = stream.rays;
         const int count = __builtin_popcountll(active);
-        if (count >= kFewestForBoxes && rays.has_beam) {
-            const std::uint32_t children = rays.beam.meets(node);
-            if (is_for_packets(active, children)) {
-                stats_.visit(count, rays.packets_of(active) * N);
-                visit_by_packets(stream, node, children, active);
-                return;
+        if constexpr (query == Query::kAny) {
+            if (count >= kFewestForBoxes && rays.has_beam) {
+                const std::uint32_t children = rays.beam.meets(node);
+                if (is_for_packets(active, children)) {
+                    stats_.visit(count, rays.packets_of(active) * N);
+                    visit_by_packets(stream, node, children, active);
+                    return;
+                }
             }
         }
         stats_.visit(count, count);
@@ -180,31 +183,22 @@ private:
             push(stream, bottom, {node.child[child], set, enter[child]});
         }
     }
-    /// Each packet of rays meets one child after the other, of those that the beam meets.
+    /// For any-hit: each packet of rays meets one child after the other, of those that the beam
+    /// meets.
     PACKET_INLINE void visit_by_packets(Stream<Isa>& stream, const WideNode& node,
                                         std::uint32_t children, RaySet active) const {
         const StreamRays<Isa>& rays = stream.rays;
-        const int bottom = stream.size;
         for (; children != 0; children &= children - 1) {
             const int child = __builtin_ctz(children);
             const BoxPlanes<Directions::kShared, N, Isa> planes(node, child, rays.near_side);
             RaySet set = 0;
-            Lanes first_enter(__builtin_huge_valf());
             for (int p = 0; p < rays.kPackets; ++p) {
-                const std::uint32_t some = rays.part(active, p);
-                if (some == 0) continue;
-                const Interval<N, Isa> box = planes.slabs(rays.packet[p]);
-                const std::uint32_t met = meets(rays.packet[p], box, rays.best[p].t).bits() & some;
-                set |= RaySet{met} << p * N;
-                if constexpr (query == Query::kClosest) {
-                    const Lanes enter = max(box.enter, rays.packet[p].hit.tnear);
-                    first_enter =
-                        select(Mask<N, Isa>::from_bits(met), min(enter, first_enter), first_enter);
-                }
+                if (rays.part(active, p) == 0) continue;
+                const PreparedRays<N, Isa>& packet = rays.packet[p];
+                set |= RaySet{meets(packet, planes.slabs(packet), rays.best[p].t).bits()} << p * N;
             }
-            if (set == 0) continue;
-            const float enter = query == Query::kClosest ? smallest_lane(first_enter) : 0.0f;
-            push(stream, bottom, {node.child[child], set, enter});
+            set &= active;
+            if (set != 0) push(stream, stream.size, {node.child[child], set, 0.0f});
         }
     }
 
@@ -223,54 +217,52 @@ private:
 
     PACKET_INLINE void meet_leaf(Stream<Isa>& stream, BlockRange range, RaySet active,
                                  float enter) const {
-        const StreamRays<Isa>& rays = stream.rays;
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
-            const TriangleBlock& block = tree_.blocks[b];
-            const std::uint32_t lanes = range.lanes(b);
-            if constexpr (query == Query::kAny) active &= stream.looking;
-            if (__builtin_popcountll(active) >= kFewestForTriangles && rays.has_beam) {
-                const std::uint32_t triangles = lanes & rays.beam.meets(block);
-                if (is_for_packets(active, triangles)) {
-                    meet_by_packets(stream, block, triangles, active, enter);
-                    continue;
-                }
-            }
             if constexpr (query == Query::kAny) {
-                occlude(stream, active, block, __builtin_popcount(lanes));
+                occlude(stream, active & stream.looking, tree_.blocks[b], range.lanes(b));
             } else {
-                meet_block(stream, active, enter, block, __builtin_popcount(lanes));
+                const int triangles = __builtin_popcount(range.lanes(b));
+                meet_block(stream, active, enter, tree_.blocks[b], triangles);
             }
         }
+    }
+    /// Those that hit a triangle stop looking.
+    PACKET_INLINE void occlude(Stream<Isa>& stream, RaySet active, const TriangleBlock& block,
+                               std::uint32_t lanes) const {
+        if (__builtin_popcountll(active) >= kFewestForTriangles && stream.rays.has_beam) {
+            const std::uint32_t triangles = lanes & stream.rays.beam.meets(block);
+            if (is_for_packets(active, triangles)) {
+                occlude_by_packets(stream, active, block, triangles);
+                return;
+            }
+        }
+        occlude_by_rays(stream, active, block, __builtin_popcount(lanes));
     }
 
     /// Each packet of rays meets one triangle after the other.
-    PACKET_INLINE void meet_by_packets(Stream<Isa>& stream, const TriangleBlock& block,
-                                       std::uint32_t triangles, RaySet active, float enter) const {
+    PACKET_INLINE void occlude_by_packets(Stream<Isa>& stream, RaySet active,
+                                          const TriangleBlock& block,
+                                          std::uint32_t triangles) const {
         if (triangles == 0) return;
         StreamRays<Isa>& rays = stream.rays;
         for (int p = 0; p < rays.kPackets; ++p) {
-            const std::uint32_t some = rays.part(active, p);
-            if (some == 0) continue;
+            const std::uint32_t lanes = rays.part(active, p);
+            if (lanes == 0) continue;
+            stats_.triangles(__builtin_popcount(lanes) * __builtin_popcount(triangles));
             BestHits<N, Isa>& best = rays.best[p];
-            const Lanes former_t = best.t;
-            auto mask = Mask<N, Isa>::from_bits(some);
-            if constexpr (query == Query::kClosest) mask = mask & (Lanes(enter) <= former_t);
-            stats_.triangles(count(mask) * __builtin_popcount(triangles));
+            const auto mask = Mask<N, Isa>::from_bits(lanes);
+            const std::int32_t any_instance = 0;
             const PacketLeaf<query, Directions::kShared, N, Isa> leaf{rays.packet[p], rays.axis,
-                                                                      instance_id_, best};
+                                                                      any_instance, best};
             for (std::uint32_t left = triangles; left != 0; left &= left - 1) {
                 leaf.meet(block, __builtin_ctz(left), mask);
             }
-            const std::uint32_t hit = (best.t < former_t).bits();
-            if constexpr (query == Query::kAny) {
-                stream.looking &= ~(RaySet{hit} << p * N);
-            } else {
-                rays.update_best_t(p, hit);
-            }
+            const std::uint32_t hit = (~(best.t > Lanes(kNever))).bits() & lanes;
+            stream.looking &= ~(RaySet{hit} << p * N);
         }
     }
 
-    /// Each ray meets all triangles at once.
+    /// For closest-hit: each ray meets all triangles at once.
     PACKET_INLINE void meet_block(Stream<Isa>& stream, RaySet active, float enter,
                                   const TriangleBlock& block, int triangles) const {
         StreamRays<Isa>& rays = stream.rays;
@@ -283,10 +275,10 @@ private:
                                [&](const BlockHit& hit) { rays.update(r, hit); });
         }
     }
-    /// Those that hit a triangle stop looking. Which ones do of those that may is added up, not
+    /// Each ray meets all triangles at once. Which ones hit one of those that may is added up, not
     /// branched on: it is anybody's guess.
-    PACKET_INLINE void occlude(Stream<Isa>& stream, RaySet active, const TriangleBlock& block,
-                               int triangles) const {
+    PACKET_INLINE void occlude_by_rays(Stream<Isa>& stream, RaySet active,
+                                       const TriangleBlock& block, int triangles) const {
         const StreamRays<Isa>& rays = stream.rays;
         RaySet hit = 0, open = 0;
         for (RaySet left = active; left != 0; left &= left - 1) {
@@ -323,7 +315,6 @@ private:
     }
 
     const TreeView& tree_;
-    std::int32_t instance_id_;
     Stats& stats_;
     const RayBits bits_;
 };

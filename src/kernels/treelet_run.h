@@ -29,7 +29,7 @@ public:
           tree_(*instance.tree),
           instance_id_(static_cast<std::int32_t>(instance.instance_id)),
           stats_(batch.rays.stats),
-          walk_(tree_, instance_id_, stats_) {}
+          walk_(tree_, stats_) {}
 
     PACKET_INLINE void run() {
         const std::size_t all = batch_.rays.count;
@@ -48,7 +48,7 @@ public:
 
 private:
     PACKET_INLINE void load(const RayColumns& columns, std::size_t begin, int count) {
-        load_stream(stream_, tree_, instance_id_, columns, count);
+        load_stream<query>(stream_, tree_, instance_id_, columns, count);
         stats_.treelet_stream(count);
         begin_ = begin;
         if (batch_.best_t == nullptr) return;
