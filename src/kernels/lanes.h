@@ -187,17 +187,13 @@ template <>
 inline constexpr int kPacketLanes<isa::Avx512> = 16;
 
 /// One lane of numbers that lie in memory, where it lies there.
-template <int N, class Isa>
-PACKET_INLINE const float& lane_of(const Float<N, Isa>& lanes, int lane) {
-    return reinterpret_cast<const float*>(lanes.r)[lane];
+template <class Lanes, class T, int N, class Isa>
+PACKET_INLINE const T& lane_of(const LaneValues<Lanes, T, N, Isa>& lanes, int lane) {
+    return reinterpret_cast<const T*>(static_cast<const Lanes&>(lanes).r)[lane];
 }
-template <int N, class Isa>
-PACKET_INLINE float& lane_of(Float<N, Isa>& lanes, int lane) {
-    return reinterpret_cast<float*>(lanes.r)[lane];
-}
-template <int N, class Isa>
-PACKET_INLINE std::int32_t& lane_of(Int<N, Isa>& lanes, int lane) {
-    return reinterpret_cast<std::int32_t*>(lanes.r)[lane];
+template <class Lanes, class T, int N, class Isa>
+PACKET_INLINE T& lane_of(LaneValues<Lanes, T, N, Isa>& lanes, int lane) {
+    return reinterpret_cast<T*>(static_cast<Lanes&>(lanes).r)[lane];
 }
 
 /// Lanes that take several registers, one register of them at a time: what keeps many values alive

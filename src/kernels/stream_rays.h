@@ -70,7 +70,7 @@ struct StreamRays {
         return out;
     }
 
-    PACKET_INLINE std::int32_t prim_id(int r) { return lane_of(best[r / N].prim_id, r % N); }
+    PACKET_INLINE std::int32_t prim_id(int r) const { return lane_of(best[r / N].prim_id, r % N); }
     PACKET_INLINE void set_prim_id(int r, std::int32_t id) {
         lane_of(best[r / N].prim_id, r % N) = id;
         lane_of(best[r / N].tie_prim_id, r % N) = id;

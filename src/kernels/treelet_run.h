@@ -87,7 +87,7 @@ private:
         }
     }
 
-    PACKET_INLINE void write_hit(int r, Hit& out) {
+    PACKET_INLINE void write_hit(int r, Hit& out) const {
         constexpr int N = kPacketLanes<Isa>;
         const BestHits<N, Isa>& best = stream_.rays.best[r / N];
         out.t = lane_of(best.t, r % N);
