@@ -287,10 +287,9 @@ TEST_CASE("shadow rays go by tiles where these are full, by streams elsewhere, w
             const auto [by_tiles, tile_lanes] = trace(scene, rays, Mode::kTile, isa);
             CHECK(by_auto == want);
             CHECK(by_tiles == want);
-            // Rays of streams are never idle, those of a tile's packets are.
+            // Where streams go by packets some lanes are idle, but far fewer than in tiles.
             CHECK(auto_lanes < 1.0);
-            if (is_fine) CHECK(1.0 - auto_lanes < 0.3 * (1.0 - tile_lanes));
-            if (!is_fine) CHECK(auto_lanes < 0.95);
+            CHECK(1.0 - auto_lanes < 0.3 * (1.0 - tile_lanes));
         }
     }
 }
