@@ -251,7 +251,7 @@ TEST_CASE("statistics count work, and counting changes no hit") {
     }
 }
 
-TEST_CASE("shadow rays go by tiles where these are full, by streams elsewhere, with one answer") {
+TEST_CASE("shadow rays go by streams, and where most meet the same by packets, with one answer") {
     // 128 x 128 rays from a plane through the terrain to one light above it
     const auto rays_over = [](const Bounds3f& box) {
         constexpr int kSide = 128;
