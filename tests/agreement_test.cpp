@@ -121,6 +121,20 @@ TEST_CASE("rays that start or end ever farther away, or never end") {
     check_agreement(scene, rays, "far ends");
 }
 
+TEST_CASE("the first rays of a stream can hit nothing") {
+    Scene scene = make_scene(tools::make_sphere(1000));
+    const Bounds3f box = scene.bounds();
+    const glm::vec3 eye = box.upper + glm::vec3(5.0f, 1.0f, 1.5f) * box.extent();
+    std::vector<Ray> rays;
+    for (int i = 0; i < 64; ++i) {
+        const glm::vec3 place(0.5f, 0.3f + 0.05f * static_cast<float>(i % 8),
+                              0.3f + 0.05f * static_cast<float>(i / 8));
+        rays.push_back(aim(eye, box.lower + place * box.extent()));
+        if (i < 16) rays.back().tfar = -1.0f;
+    }
+    check_agreement(scene, rays, "the first 16 of 64");
+}
+
 TEST_CASE("rays in the planes of boxes, along axes, and starting on them") {
     TriangleMesh mesh = make_grid(8, 8, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
     const TriangleMesh wall = make_grid(8, 8, {0, 0, 0}, {0, 1, 0}, {0, 0, 1});

@@ -53,7 +53,10 @@ struct StreamRays {
     }
     /// After the last of so many packets.
     PACKET_INLINE void bound(int packet_count) {
-        const BeamBounds bounds = bound_rays(packet, best, packet_count);
+        has_beam = active != 0;
+        if (!has_beam) return;
+        const int first = __builtin_ctzll(active) / N;  // with a ray that tells their directions
+        const BeamBounds bounds = bound_rays(packet + first, best + first, packet_count - first);
         has_beam = bounds.is_sound;
         beam = Beam<Isa>(bounds);
     }
