@@ -1,19 +1,22 @@
-// Which packets of a tile may hit which triangles of a block. Where a beam's rays spread from, or
-// narrow to, is its anchor, and seen from there each packet is a range of slopes and each triangle
-// another: these are found once, eight triangles at a time, and then four comparisons tell which of
-// the eight a packet may hit.
+// Which packets of a tile may meet which children of a node, or triangles of a block. Where a
+// beam's rays spread from, or narrow to, is its anchor, and seen from there each packet is a range
+// of slopes and each box or triangle another: these are found once, for eight of them at a time,
+// and then four comparisons tell which of the eight a packet may meet, or which of eight packets
+// meet one.
 #pragma once
 
 #include "kernels/beam.h"
 
 namespace packet {
 
-/// Slopes, over the way from the anchor, that lines of a beam may have to triangles, one a lane.
+/// Slopes, over the way from the anchor, that lines of a beam may have to boxes or triangles, one a
+/// lane.
 template <class Isa>
-struct TriangleSlopes {
-    Float<kBlockSize, Isa> least[2], most[2];
-    Mask<kBlockSize, Isa> open;  ///< triangles that reach behind the anchor: they may have any
+struct SlopeRanges {
+    Float<kWideSize, Isa> least[2], most[2];
+    Mask<kWideSize, Isa> open;  ///< what reaches behind the anchor: it may have any
 };
+static_assert(kBlockSize == kWideSize);
 
 /// The slopes of a beam's packets, at most kPackets of them. Rounding here is 4 ulp of a triangle's
 /// distance from the anchor, 5 reaches at most, and with that of the beam's lines 47 ulp of the
@@ -39,9 +42,26 @@ public:
         }
     }
 
-    [[nodiscard]] PACKET_INLINE TriangleSlopes<Isa> to(const TriangleBlock& block) const {
-        constexpr float kLeastWay = 1e-30f;  // so that no product is 0 * inf
-        TriangleSlopes<Isa> out;
+    /// To the children of a node.
+    [[nodiscard]] PACKET_INLINE SlopeRanges<Isa> to(const WideNode& node) const {
+        SlopeRanges<Isa> out;
+        F way[2], per_way[2];
+        for (int side = 0; side < 2; ++side) {
+            way[side] = multiply_subtract(F::load(node.plane[side][axis_[2]]), away_, anchor_);
+            per_way[side] = F(1.0f) / way[side];
+        }
+        out.open = min(way[0], way[1]) < F(kLeastWay);
+        for (int a = 0; a < 2; ++a) {
+            const F lower = F::load(node.plane[0][axis_[a]]) - offset_[a][kUpper];
+            const F upper = F::load(node.plane[1][axis_[a]]) - offset_[a][kLower];
+            out.least[a] = min(lower * per_way[0], lower * per_way[1]);
+            out.most[a] = max(upper * per_way[0], upper * per_way[1]);
+        }
+        return out;
+    }
+    /// To the triangles of a block.
+    [[nodiscard]] PACKET_INLINE SlopeRanges<Isa> to(const TriangleBlock& block) const {
+        SlopeRanges<Isa> out;
         F per_way[3], nearest;
         for (int corner = 0; corner < 3; ++corner) {
             const F way = multiply_subtract(F::load(block.v[corner][axis_[2]]), away_, anchor_);
@@ -61,19 +81,34 @@ public:
         return out;
     }
     /// The triangles that rays of any packet may hit.
-    [[nodiscard]] PACKET_INLINE std::uint32_t meets(const TriangleSlopes<Isa>& to) const {
+    [[nodiscard]] PACKET_INLINE std::uint32_t meets(const SlopeRanges<Isa>& to) const {
         return overlap(to, least_of_all_, most_of_all_);
     }
+    /// The packets of which rays may meet a child.
+    [[nodiscard]] PACKET_INLINE std::uint32_t packets(const SlopeRanges<Isa>& to, int child) const {
+        const F least[2] = {lane_of(to.least[0], child), lane_of(to.least[1], child)};
+        const F most[2] = {lane_of(to.most[0], child), lane_of(to.most[1], child)};
+        std::uint32_t out = (to.open.bits() >> child & 1u) != 0 ? ~0u : 0u;
+        for (int p = 0; p < kPackets; p += 8) {
+            const auto x =
+                (least[0] <= F::load(most_[0] + p)) & (F::load(least_[0] + p) <= most[0]);
+            const auto y =
+                (least[1] <= F::load(most_[1] + p)) & (F::load(least_[1] + p) <= most[1]);
+            out |= (x & y).bits() << p;
+        }
+        return out;
+    }
     /// The triangles that rays of the packet may hit.
-    [[nodiscard]] PACKET_INLINE std::uint32_t meets(const TriangleSlopes<Isa>& to, int p) const {
+    [[nodiscard]] PACKET_INLINE std::uint32_t meets(const SlopeRanges<Isa>& to, int p) const {
         const F least[2] = {least_[0][p], least_[1][p]}, most[2] = {most_[0][p], most_[1][p]};
         return overlap(to, least, most);
     }
 
 private:
-    using F = Float<kBlockSize, Isa>;
+    using F = Float<kWideSize, Isa>;
+    static constexpr float kLeastWay = 1e-30f;  // so that no product is 0 * inf
 
-    PACKET_INLINE static std::uint32_t overlap(const TriangleSlopes<Isa>& to, const F (&least)[2],
+    PACKET_INLINE static std::uint32_t overlap(const SlopeRanges<Isa>& to, const F (&least)[2],
                                                const F (&most)[2]) {
         const auto x = (to.least[0] <= most[0]) & (least[0] <= to.most[0]);
         const auto y = (to.least[1] <= most[1]) & (least[1] <= to.most[1]);

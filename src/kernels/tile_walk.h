@@ -1,6 +1,7 @@
 // Walks the 8-wide form of a tree with a tile: packets of rays in one beam. The beam rejects
-// children and triangles eight at a time; what it leaves is met by the packets, whose exact tests
-// leave a mask of those that are active below.
+// children and triangles eight at a time, and for what it leaves the packets' slopes tell which of
+// them may meet it, again eight at a time; their exact tests leave a mask of those that are active
+// below.
 //
 // Wald, Boulos, Shirley. Ray tracing deformable scenes using dynamic bounding volume hierarchies.
 // TOG 2007. Fuetterling, Lojewski, Pfreundt, Ebert. Efficient ray tracing kernels for modern CPU
@@ -20,7 +21,7 @@ inline constexpr int kTileRays = 128;
 template <int N>
 inline constexpr int kTilePackets = kTileRays / N;
 
-/// A child to visit, and the packets that have met its parent.
+/// A child to visit, and the packets that may meet it.
 struct TileEntry {
     const WideNode* node;
     std::uint32_t child;
@@ -74,15 +75,18 @@ public:
     }
 
 private:
-    /// Pushes the children that the beam meets, for closest-hit the nearest last.
+    /// Pushes the children that packets may meet, for closest-hit the nearest last.
     PACKET_INLINE void push_children(const WideNode& node, std::uint32_t packets) {
         Float<kWideSize, Isa> depths;
         std::uint32_t bits = beam_.meets(node, depths);
         float depth[kWideSize];
         depths.store(depth);
+        const SlopeRanges<Isa> to = slopes_.to(node);
         const int bottom = size_;
         for (; bits != 0; bits &= bits - 1) {
             const int child = __builtin_ctz(bits);
+            const std::uint32_t left = packets & slopes_.packets(to, child);
+            if (left == 0) continue;
             prefetch(tree_, node.child[child]);
             int place = size_++;
             if constexpr (query == Query::kClosest) {
@@ -90,7 +94,7 @@ private:
                     stack_[place] = stack_[place - 1];
                 }
             }
-            stack_[place] = {&node, static_cast<std::uint32_t>(child), packets, depth[child]};
+            stack_[place] = {&node, static_cast<std::uint32_t>(child), left, depth[child]};
         }
     }
 
@@ -147,7 +151,7 @@ private:
     }
     PACKET_INLINE void meet_block(const TriangleBlock& block, std::uint32_t lanes,
                                   std::uint32_t packets) {
-        const TriangleSlopes<Isa> to = slopes_.to(block);
+        const SlopeRanges<Isa> to = slopes_.to(block);
         lanes &= slopes_.meets(to);
         if ((lanes & to.open.bits()) != 0) [[unlikely]]
             lanes &= beam_.meets(block);
