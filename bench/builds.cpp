@@ -2,6 +2,7 @@
 // table in Markdown. docs/benchmarking.md shows what it prints.
 #include "embree_reference.h"
 #include "markdown.h"
+#include "peak_memory.h"
 #include "program.h"
 
 #include <packet/accel.h>
@@ -40,6 +41,12 @@ struct Builder {
     std::function<Built(const Scene&)> build;
     Rival rival;  ///< whom it is compared with: the next one, which spends about as much on a tree
 };
+using Builders = std::array<Builder, 7>;
+
+[[nodiscard]] std::size_t bytes_of_arrays(const TriangleMesh& mesh) {
+    return mesh.positions.size() * sizeof(mesh.positions[0]) +
+           mesh.triangles.size() * sizeof(mesh.triangles[0]);
+}
 
 Builder our_builder(AccelKind accel, Rival rival) {
     const auto build = [accel](const Scene& scene) {
@@ -60,7 +67,7 @@ Builder embree_builder(EmbreeQuality quality, std::string_view name) {
     return {fmt::format("{} {}", embree_version(), name), build, Rival::kNone};
 }
 
-std::array<Builder, 7> all_builders() {
+Builders all_builders() {
     return {our_builder(AccelKind::kBvhMorton, Rival::kNext),
             embree_builder(EmbreeQuality::kLow, "low"),
             our_builder(AccelKind::kBvh, Rival::kNext),
@@ -70,10 +77,19 @@ std::array<Builder, 7> all_builders() {
             our_builder(AccelKind::kGrid, Rival::kNone)};
 }
 
-void hold_contest(std::string_view kind, const Options& options) {
-    const Scene scene = make_scene(tools::generate(kind, options.triangles));
+/// What each builder needs at most, but for the arrays, which both sides copy.
+std::array<std::size_t, 7> peaks_of(const Builders& builders, const Scene& scene) {
+    std::array<std::size_t, 7> out{};
+    for (std::size_t i = 0; i < builders.size(); ++i) {
+        out[i] = peak_bytes_of([&] { (void)builders[i].build(scene); }) -
+                 bytes_of_arrays(scene.meshes()[0]);
+    }
+    return out;
+}
+
+void hold_contest(std::string_view kind, const Scene& scene, const Builders& builders,
+                  const std::array<std::size_t, 7>& peaks, const Options& options) {
     const auto triangles = static_cast<double>(scene.triangle_count());
-    const std::array<Builder, 7> builders = all_builders();
     std::array<std::vector<double>, 7> seconds;
     std::array<Built, 7> last{};
     for (int repeat = -1; repeat < options.repeats; ++repeat) {  // the first warms up
@@ -88,15 +104,25 @@ void hold_contest(std::string_view kind, const Options& options) {
         print_cells({std::string(kind), builders[i].name, three_digits(1e-6 * triangles / median),
                      has_rival ? fmt::format("{:.2f}", tools::median(seconds[i + 1]) / median) : "",
                      fmt::format("{:.0f}", static_cast<double>(last[i].bytes) / triangles),
+                     fmt::format("{:.0f}", static_cast<double>(peaks[i]) / triangles),
                      last[i].sah_cost > 0.0 ? three_digits(last[i].sah_cost) : ""});
     }
 }
 
 void run(const Options& options) {
-    print_table_head(
-        {"scene", "builder", "Mtriangles/s", "Embree = 1", "bytes/triangle", "SAH cost"});
-    for (const std::string_view kind : {"terrain", "city", "hairball", "soup"}) {
-        hold_contest(kind, options);
+    constexpr std::array<std::string_view, 4> kKinds = {"terrain", "city", "hairball", "soup"};
+    const Builders builders = all_builders();
+    std::vector<Scene> scenes;
+    std::vector<std::array<std::size_t, 7>> peaks;
+    // First, as these processes must be started before there are threads.
+    for (const std::string_view kind : kKinds) {
+        scenes.push_back(make_scene(tools::generate(kind, options.triangles)));
+        peaks.push_back(peaks_of(builders, scenes.back()));
+    }
+    print_table_head({"scene", "builder", "Mtriangles/s", "Embree = 1", "bytes/triangle", "at most",
+                      "SAH cost"});
+    for (std::size_t i = 0; i < kKinds.size(); ++i) {
+        hold_contest(kKinds[i], scenes[i], builders, peaks[i], options);
     }
 }
 

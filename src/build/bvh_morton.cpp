@@ -151,25 +151,25 @@ public:
     }
 
 private:
-    /// Fills items_, sorted.
+    /// Fills sorted_.
     void sort() {
         const MortonGrid<Code> grid(measure(references_, parallel_).centroids);
-        ScratchVector<Item> items(count_), scratch(count_);
+        items_.resize(2 * count_);  // one array, which is worth more to those that come next
+        const auto items = std::span(items_).first(count_),
+                   scratch = std::span(items_).last(count_);
         parallel_.for_pieces(count_, kGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
                 items[i] = {grid.code(centroid2(references_[i])), static_cast<std::uint32_t>(i)};
             }
         });
-        const std::span<Item> sorted =
-            radix_sort<Item>(items, scratch, kMortonBits<Code>, parallel_,
-                             [](const Item& item) { return item.code; });
-        items_ = std::move(sorted.data() == items.data() ? items : scratch);
+        sorted_ = radix_sort<Item>(items, scratch, kMortonBits<Code>, parallel_,
+                                   [](const Item& item) { return item.code; });
     }
 
     /// Returns the height of the tree.
     int build_nodes(int dropped_bits) {
         used_ = 1;
-        const RadixKeys<Code> keys(items_, dropped_bits);
+        const RadixKeys<Code> keys(sorted_, dropped_bits);
         const Rooted all = build_range(keys, 0, static_cast<std::uint32_t>(count_ - 1));
         nodes_[0] = all.root();
         return all.subtree.height;
@@ -189,7 +189,7 @@ private:
     }
 
     Rooted build_task(const RadixKeys<Code>& keys, std::uint32_t first, std::uint32_t last) {
-        RangeBuilder<Code> builder(items_, references_, keys, rule_, ids_);
+        RangeBuilder<Code> builder(sorted_, references_, keys, rule_, ids_);
         Rooted out = builder.build(first, last);
         const auto count = static_cast<std::uint32_t>(builder.nodes().size());
         const std::uint32_t last_place =
@@ -214,6 +214,7 @@ private:
     std::size_t count_;
     ScratchVector<Reference> references_;
     ScratchVector<Item> items_;
+    std::span<const Item> sorted_;
     ScratchVector<BuildNode> nodes_;
     std::span<std::uint32_t> ids_;         ///< of the hierarchy, by item
     std::atomic<std::uint32_t> used_ = 1;  ///< nodes; the root has the first

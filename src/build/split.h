@@ -111,6 +111,7 @@ public:
           count_(references.size()),
           references_(std::move(references)) {
         if (count_ == 0) return;
+        references_.reserve(count_ + room);  // no more: resize() may double
         references_.resize(count_ + room);
         nodes_.resize(2 * references_.size() - 1);  // a leaf has a reference at least
     }

@@ -5,6 +5,7 @@
 // the time in which a tree is built anew over fresh memory.
 #include "core/aligned_vector.h"
 
+#include <algorithm>
 #include <array>
 #include <mutex>
 #include <new>
@@ -61,9 +62,14 @@ constexpr bool kKeepsBlocks = true;
 bool give_away(void* memory, std::size_t bytes) noexcept {
     return madvise(memory, bytes, MADV_FREE) == 0;
 }
+/// Gives pages to the system at once. What it refuses stays.
+void give_back(void* memory, std::size_t bytes) noexcept {
+    (void)madvise(memory, bytes, MADV_DONTNEED);
+}
 #else  // the address sanitizer finds uses of freed memory
 constexpr bool kKeepsBlocks = false;
 bool give_away(void*, std::size_t) noexcept { return false; }
+void give_back(void*, std::size_t) noexcept {}
 #endif
 
 void free_large(void* memory, std::size_t bytes) noexcept {
@@ -73,22 +79,28 @@ void free_large(void* memory, std::size_t bytes) noexcept {
 /// Blocks that nobody uses. The oldest make room for others.
 class SpareBlocks {
 public:
-    /// A block of at least `bytes`, and at most an eighth more, in pages as large; or null.
+    /// A block of at least `bytes`, and at most twice as many, in pages as large; or null. Of what
+    /// lies behind `bytes` no more than an eighth of them may hold pages.
     [[nodiscard]] void* take(std::size_t bytes) noexcept {
         const std::scoped_lock lock(mutex_);
         Block* best = nullptr;
         for (Block& block : blocks_) {
-            if (block.bytes < bytes || block.bytes > bytes + bytes / 8) continue;
+            if (block.bytes < bytes || block.bytes > 2 * bytes) continue;
             if (page_of(block.bytes) != page_of(bytes)) continue;
             if (best == nullptr || block.bytes < best->bytes) best = &block;
         }
-        return best == nullptr ? nullptr : std::exchange(*best, Block{}).memory;
+        if (best == nullptr || (best->bytes != bytes && !note_size(*best))) return nullptr;
+        const Block taken = std::exchange(*best, Block{});
+        const std::size_t left = taken.bytes - bytes;
+        if (left > bytes / 8) give_back(static_cast<char*>(taken.memory) + bytes, left);
+        return taken.memory;
     }
 
     /// Takes over a block that would else be freed, and frees those there is no more room for.
     void put(void* memory, std::size_t bytes) noexcept {
-        if (!kKeepsBlocks || bytes > kMostBytes) return free_large(memory, bytes);
         const std::scoped_lock lock(mutex_);
+        bytes = noted_size(memory, bytes);
+        if (!kKeepsBlocks || bytes > kMostBytes) return free_large(memory, bytes);
         Block moved{memory, bytes, false};
         std::size_t sum = 0;
         for (Block& block : blocks_) {
@@ -110,6 +122,19 @@ private:
     };
     static void free_block(const Block& block) noexcept { free_large(block.memory, block.bytes); }
 
+    /// Of a block that is taken as a smaller one; false if no more can be noted.
+    bool note_size(const Block& block) noexcept {
+        Block* const free = std::ranges::find(larger_, nullptr, &Block::memory);
+        if (free == larger_.end()) return false;
+        *free = block;
+        return true;
+    }
+    /// Of a block that comes back, with the size as which it was taken.
+    std::size_t noted_size(void* memory, std::size_t bytes) noexcept {
+        Block* const noted = std::ranges::find(larger_, memory, &Block::memory);
+        return noted == larger_.end() ? bytes : std::exchange(*noted, Block{}).bytes;
+    }
+
     // What glibc keeps of freed memory, and what it takes to sort a million rays.
     static constexpr std::size_t kMostBytesKept = std::size_t{32} << 20;
     // What a build of some million triangles uses at once.
@@ -117,6 +142,7 @@ private:
 
     std::mutex mutex_;
     std::array<Block, 64> blocks_;  ///< the newest first
+    std::array<Block, 64> larger_;  ///< those in use as smaller ones
 };
 
 /// Never destroyed: vectors of static lifetime may be freed after anything else.
