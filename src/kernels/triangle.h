@@ -10,6 +10,7 @@
 // Woop, Benthin, Wald. Watertight ray/triangle intersection. JCGT 2013.
 #pragma once
 
+#include "core/bits.h"
 #include "kernels/box.h"
 #include "kernels/ray_setup.h"
 
@@ -91,24 +92,33 @@ PACKET_INLINE Mask<N, Isa> is_ill_conditioned(const Float3<N, Isa> (&p)[3],
     return abs(det) * Float<N, Isa>(kWorstCondition) < largest_area(p);
 }
 
-/// t, u and v of the lanes in `bits`, in double from the sheared corners.
+/// t, u and v of a lane, in double from the sheared corners.
+template <int N>
+PACKET_INLINE void refine_hit(const StoredCorners<N>& p, int i, StoredHits<N>& hits) {
+    const auto edge = [&](int a, int b) {  // exact products, one rounding
+        return static_cast<double>(p.x[a][i]) * p.y[b][i] -
+               static_cast<double>(p.y[a][i]) * p.x[b][i];
+    };
+    const double edges[3] = {edge(2, 1), edge(0, 2), edge(1, 0)};
+    const double det = edges[0] + edges[1] + edges[2];
+    const double weights[3] = {edges[0] / det, edges[1] / det, edges[2] / det};
+    const double depth = weights[0] * p.z[0][i] + weights[1] * p.z[1][i] + weights[2] * p.z[2][i];
+    hits.t[i] = static_cast<float>(depth * hits.scale_z[i]);
+    hits.u[i] = static_cast<float>(weights[1]);
+    hits.v[i] = static_cast<float>(weights[2]);
+}
+/// Of the lanes in `bits`, and maybe of others: a loop over all lanes becomes one of registers,
+/// which costs as much as some three lanes one by one.
 template <int N, class Isa>
-PACKET_NOINLINE void refine_hits(const StoredCorners<N>& p, std::uint32_t bits,
+PACKET_NOINLINE void refine_hits(const StoredCorners<N>& corners, std::uint32_t bits,
                                  StoredHits<N>& hits) {
-    for (; bits != 0; bits &= bits - 1) {
-        const int i = lowest_bit(bits);
-        const auto edge = [&](int a, int b) {  // exact products, one rounding
-            return static_cast<double>(p.x[a][i]) * p.y[b][i] -
-                   static_cast<double>(p.y[a][i]) * p.x[b][i];
-        };
-        const double edges[3] = {edge(2, 1), edge(0, 2), edge(1, 0)};
-        const double det = edges[0] + edges[1] + edges[2];
-        const double weights[3] = {edges[0] / det, edges[1] / det, edges[2] / det};
-        const double depth =
-            weights[0] * p.z[0][i] + weights[1] * p.z[1][i] + weights[2] * p.z[2][i];
-        hits.t[i] = static_cast<float>(depth * hits.scale_z[i]);
-        hits.u[i] = static_cast<float>(weights[1]);
-        hits.v[i] = static_cast<float>(weights[2]);
+    constexpr int kMostOneByOne = 3;
+    if (set_bits(bits) <= kMostOneByOne) {
+        for (; bits != 0; bits &= bits - 1) refine_hit(corners, lowest_bit(bits), hits);
+    } else {
+        StoredHits<N> out = hits;  // nothing that is written is read
+        for (int i = 0; i < N; ++i) refine_hit(corners, i, out);
+        hits = out;
     }
 }
 
@@ -306,7 +316,9 @@ PACKET_INLINE TriangleHits<N, Isa> decide_hits(const ShearedTriangles<N, Isa>& s
         F(ray.scale_z).store(hits.scale_z);
         out.t.store(hits.t), out.u.store(hits.u), out.v.store(hits.v);
         refine_hits<N, Isa>(StoredCorners<N>(p), ill.bits(), hits);
-        out.t = F::load(hits.t), out.u = F::load(hits.u), out.v = F::load(hits.v);
+        out.t = select(ill, F::load(hits.t), out.t);
+        out.u = select(ill, F::load(hits.u), out.u);
+        out.v = select(ill, F::load(hits.v), out.v);
     }
 
     const Interval<N, Isa> box = triangle_box<N, Isa>(ray, triangles);
