@@ -1,12 +1,15 @@
 // Every structure, mode, width, instruction set and number of threads against the oracle.
 #include "configurations.h"
 #include "generate.h"
+#include "random.h"
 #include "share.h"
 #include "test_rays.h"
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 using namespace packet;
 using namespace packet::test;
@@ -161,6 +164,46 @@ TEST_CASE("rays in the planes of boxes, along axes, and starting on them") {
         }
     }
     check_agreement(make_scene(std::move(mesh)), rays, "planes");
+}
+
+TEST_CASE("rays that start next to surfaces, or just where they hit them") {
+    // On either side of walls, by up to what boxes are grown by, and any way, as shadows' rays do.
+    for (int axis = 0; axis < 3; ++axis) {
+        glm::vec3 origin(-7.3f, 3.1f, 5.9f), u(0.0f), v(0.0f), normal(0.0f);
+        u[(axis + 1) % 3] = 1.13f, v[(axis + 2) % 3] = 0.87f, normal[axis] = 1.0f;
+        const Scene scene = make_scene(make_grid(12, 12, origin, u, v));
+        const Oracle oracle(scene);
+        tools::Random random(31);
+        std::vector<Ray> rays;
+        for (int i = 0; i < 2048; ++i) {
+            const float across = random.uniform(0.0f, 12.0f), up = random.uniform(0.0f, 12.0f);
+            const float ulps = random.uniform(-3.0f, 3.0f) * static_cast<float>(1 << i % 4);
+            Ray ray;
+            ray.org = origin + across * u + up * v + ulps * 0x1p-21f * normal;
+            ray.dir = random.direction();
+            if (i % 2 == 1) ray.org -= random.uniform() * ray.dir;
+            if (i % 8 < 2) ray.dir[axis] *= 1e-3f;
+            if (i % 5 == 1) ray.tfar = 0.1f;
+            const Hit hit = oracle.closest(ray);
+            if (i % 4 == 3 && hit.is_hit()) ray.tnear = hit.t;
+            rays.push_back(ray);
+        }
+        check_agreement(scene, rays, "next to a wall");
+    }
+}
+
+TEST_CASE("directions so short that products with their reciprocals overflow") {
+    TriangleMesh mesh = tools::make_sphere(1000);
+    for (glm::vec3& p : mesh.positions) p = 100.0f * p + 1e6f;
+    const Scene scene = make_scene(mesh);
+    std::vector<Ray> rays = random_rays(scene.bounds(), 2048, 37);
+    for (Ray& ray : rays) {
+        ray.dir *= 0x1p-115f / glm::length(ray.dir);  // t is far below the largest float
+        ray.tnear = 1e30f, ray.tfar = std::numeric_limits<float>::infinity();
+    }
+    const Oracle oracle(scene);
+    CHECK(std::ranges::count_if(rays, [&](const Ray& ray) { return oracle.any(ray); }) > 500);
+    check_agreement(scene, rays, "short directions");
 }
 
 TEST_CASE("slivers") {

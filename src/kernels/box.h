@@ -3,7 +3,7 @@
 // decide nothing: a multiply-add a plane, with boxes taken as grown by more, so that it never
 // rejects a box that holds a triangle whose own box is met. In either form each step rounds
 // monotonically, so a box that contains another is entered no later and left no earlier, to the
-// last bit.
+// last bit. Rays that go one by one leave nodes by the contract's form (ExitOrigins).
 #pragma once
 
 #include "kernels/ray_setup.h"

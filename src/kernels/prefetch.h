@@ -17,11 +17,11 @@ PACKET_INLINE void prefetch(const TreeView& tree, const WideChild& child) {
         reinterpret_cast<const char*>(tree.wide_nodes) + sizeof(WideNode) * std::size_t{child.link};
     const auto is_leaf = static_cast<std::ptrdiff_t>(child.is_leaf());
     const char* const at = node + (leaf - node) * is_leaf;
-    constexpr std::size_t kLines = sizeof(TriangleBlock) / 64;
-    static_assert(sizeof(WideNode) <= sizeof(TriangleBlock));
-    for (std::size_t i = 0; i < kLines; ++i) {
-        __builtin_prefetch(at + 64 * i);
-    }
+    constexpr std::ptrdiff_t kLine = 64, kNodeLines = sizeof(WideNode) / kLine;
+    static_assert(sizeof(TriangleBlock) == (kNodeLines + 1) * kLine);
+    for (std::ptrdiff_t i = 0; i < kNodeLines; ++i) __builtin_prefetch(at + kLine * i);
+    // The last line of a block; of a node the first one again, which takes nothing.
+    __builtin_prefetch(at + kLine * kNodeLines * is_leaf);
 }
 
 }  // namespace packet

@@ -139,6 +139,12 @@ PACKET_INLINE Float<N, Isa> box_growth(const TreeView& tree, const RayLanes<N, I
     return (reach + F(tree.reach)) * F(tree.slack);
 }
 
+/// By how much the quick form moves the origin along an axis, `growth` being that of the boxes.
+template <int N, class Isa>
+PACKET_INLINE Float<N, Isa> node_growth(const Float<N, Isa>& growth, const Float<N, Isa>& org) {
+    return growth + growth + abs(org) * Float<N, Isa>(4.0f * kOriginSlack);
+}
+
 /// The quick form takes boxes as grown by 8 ulp of the reach and 3 of the origin more than the
 /// contract's form, so that it rejects no box in which that finds a triangle's. It bounds
 /// reciprocals by 2^32 times that of the longest axis; what drift this neglects is less than the
@@ -155,7 +161,7 @@ PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Is
     const F limit = min(F(kLargestFloat), least * F(kSteepest));
     for (int a = 0; a < 3; ++a) {
         const F inv_dir = max(F(0.0f) - limit, min(limit, reciprocal[a]));
-        const F more = growth + growth + abs(ray.org[a]) * F(4.0f * kOriginSlack);
+        const F more = node_growth(growth, ray.org[a]);
         const F lower = (ray.org[a] + more) * inv_dir, upper = (ray.org[a] - more) * inv_dir;
         // if (|lower| > largest || |upper| > largest) 0 * plane - shift is -inf or inf, which
         // passes
@@ -166,6 +172,30 @@ PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Is
         out.shift[1][a] = select(fits, upper, F(0.0f) - open);
     }
 }
+
+/// Origins by which rays leave nodes no later than boxes of the contract's form, so that they leave
+/// behind the surface that they start next to: t = (plane - org[side][axis]) * inv_dir. Where
+/// inv_dir is less than the contract's, they are moved as far as by the quick form; where it is 0,
+/// t is NaN, and the plane holds nothing back if min() takes that first.
+template <int N, class Isa>
+struct ExitOrigins {
+    using F = Float<N, Isa>;
+    F org[2][3];
+
+    PACKET_INLINE ExitOrigins(const PreparedRays<N, Isa>& from, const TreeView& tree,
+                              const RayLanes<N, Isa>& ray) {
+        const F infinity(__builtin_huge_valf()), growth = box_growth(tree, ray);
+        for (int a = 0; a < 3; ++a) {
+            const F more = node_growth(growth, ray.org[a]);
+            const auto is_exact = from.inv_dir[a] == from.hit.reciprocal[a];
+            const auto is_open = from.inv_dir[a] == F(0.0f);
+            const F lower = select(is_open, infinity, ray.org[a] + more);
+            const F upper = select(is_open, F(0.0f) - infinity, ray.org[a] - more);
+            org[0][a] = select(is_exact, from.hit.org[0][a], lower);
+            org[1][a] = select(is_exact, from.hit.org[1][a], upper);
+        }
+    }
+};
 
 template <int N, class Isa>
 PACKET_INLINE void prepare_boxes(PreparedRays<N, Isa>& out, const TreeView& tree,

@@ -16,8 +16,8 @@ struct PreparedLanes {
         kTnear,
         kInvDir,                   ///< for nodes, as the next two
         kNearShift = kInvDir + 3,  ///< for the planes that are met first
-        kFarShift = kNearShift + 3,
-        kShearOrg = kFarShift + 3,  ///< in the order of the ray's axes
+        kFarOrg = kNearShift + 3,  ///< of ExitOrigins
+        kShearOrg = kFarOrg + 3,   ///< in the order of the ray's axes
         kShearX = kShearOrg + 3,
         kShearY,
         kScaleZ,
@@ -46,6 +46,7 @@ PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLan
     prepare_boxes(from, tree, ray);
     prepare_shear(from, ray);
     const Float3<kSingleLanes, Isa> shear_org = rotate_axes(from.shear, ray.org);
+    const ExitOrigins<kSingleLanes, Isa> exits(from, tree, ray);
     from.hit.tnear.store(out.number[L::kTnear]);
     shear_org.x.store(out.number[L::kShearOrg]);
     shear_org.y.store(out.number[L::kShearOrg + 1]);
@@ -58,7 +59,7 @@ PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLan
         const F &lower = from.shift[0][a], &upper = from.shift[1][a];
         from.inv_dir[a].store(out.number[L::kInvDir + a]);
         select(backward, upper, lower).store(out.number[L::kNearShift + a]);
-        select(backward, lower, upper).store(out.number[L::kFarShift + a]);
+        select(backward, exits.org[0][a], exits.org[1][a]).store(out.number[L::kFarOrg + a]);
         from.hit.org[0][a].store(out.number[L::kLowerOrg + a]);
         from.hit.org[1][a].store(out.number[L::kUpperOrg + a]);
         from.hit.reciprocal[a].store(out.number[L::kReciprocal + a]);

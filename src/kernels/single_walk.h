@@ -23,32 +23,30 @@ public:
         for (int a = 0; a < 3; ++a) {
             inv_dir_[a] = ray.number(L::kInvDir + a);
             near_shift_[a] = ray.number(L::kNearShift + a);
-            far_shift_[a] = ray.number(L::kFarShift + a);
+            far_org_[a] = ray.number(L::kFarOrg + a);
             near_planes_[a] = ray.index(L::kNearPlanes + a);
             far_planes_[a] = ray.index(L::kFarPlanes + a);
         }
     }
-    /// The children whose boxes the ray meets before `best_t`, and where it enters them, by the
+    /// The children whose boxes the ray meets before `best_t`, and where it enters them by the
     /// quick form of box.h.
     PACKET_INLINE std::uint32_t meets(const WideNode& node, const F& best_t, F& enter) const {
         const float* planes = node.plane[0][0];
-        F exit;
+        F exit = best_t;
         for (int a = 0; a < 3; ++a) {
             const F t_near =
                 multiply_subtract(F::load(planes + near_planes_[a]), inv_dir_[a], near_shift_[a]);
-            const F t_far =
-                multiply_subtract(F::load(planes + far_planes_[a]), inv_dir_[a], far_shift_[a]);
             enter = a == 0 ? t_near : max(enter, t_near);
-            exit = a == 0 ? t_far : min(exit, t_far);
+            exit = min((F::load(planes + far_planes_[a]) - far_org_[a]) * inv_dir_[a], exit);
         }
-        // if (max(enter, tnear) > min(exit, best_t)) it misses; equal must pass, for the tie rule
-        return (max(enter, tnear_) <= min(exit, best_t)).bits();
+        // if (max(enter, tnear) > exit) it misses; equal must pass, for the tie rule
+        return (max(enter, tnear_) <= exit).bits();
     }
 
 private:
     using L = PreparedLanes;
 
-    F inv_dir_[3], near_shift_[3], far_shift_[3], tnear_;
+    F inv_dir_[3], near_shift_[3], far_org_[3], tnear_;
     std::ptrdiff_t near_planes_[3], far_planes_[3];
 };
 

@@ -12,10 +12,11 @@ namespace packet {
 inline constexpr int kStreamRays = 64;
 using RaySet = std::uint64_t;
 
-/// What a ray needs at nodes and to filter triangles: one line of the cache. Planes are numbered in
-/// the order in which the stream's rays meet them, axes in that of its triangle test.
+/// What a ray needs at nodes and to filter triangles: one line of the cache. It leaves nodes by
+/// ExitOrigins. Planes are numbered in the order in which the stream's rays meet them, axes in that
+/// of its triangle test.
 struct alignas(64) StreamRay {
-    float inv_dir[3], near_shift[3], far_shift[3], tnear;
+    float inv_dir[3], near_shift[3], far_org[3], tnear;
     float best_t;
     float shear_org[3], shear_x, shear_y;
 };
@@ -43,7 +44,12 @@ struct StreamRays {
         best[p].reset(rays.tfar, used);
         best[p].enter_instance(instance_id);
         best[p].instance_id = instance_id;
-        for (int lane = 0; lane < N; lane += 8) fill(to, best[p], lane, ray + p * N + lane);
+        const ExitOrigins<N, Isa> exits(to, tree, rays);
+        Float<N, Isa> far_org[3];
+        for (int a = 0; a < 3; ++a) far_org[a] = exits.org[1 - to.near_side[a]][a];
+        for (int lane = 0; lane < N; lane += 8) {
+            fill(to, far_org, best[p], lane, ray + p * N + lane);
+        }
         if (none(used)) return;
         active |= RaySet{used.bits()} << p * N;
         for (int a = 0; a < 3; ++a) {
@@ -90,16 +96,17 @@ struct StreamRays {
 
 private:
     /// Columns of eight rays, from `lane` on, become their rows, in two halves.
-    PACKET_INLINE static void fill(const PreparedRays<N, Isa>& from, const BestHits<N, Isa>& best,
+    PACKET_INLINE static void fill(const PreparedRays<N, Isa>& from,
+                                   const Float<N, Isa> (&far_org)[3], const BestHits<N, Isa>& best,
                                    int lane, StreamRay* out) {
         const auto column = [&](const Float<N, Isa>& lanes) { return &lane_of(lanes, lane); };
         const float* const columns[2][8] = {
             {column(from.inv_dir[0]), column(from.inv_dir[1]), column(from.inv_dir[2]),
              column(from.shift[0][0]), column(from.shift[0][1]), column(from.shift[0][2]),
-             column(from.shift[1][0]), column(from.shift[1][1])},
-            {column(from.shift[1][2]), column(from.hit.tnear), column(best.t),
-             column(from.shear.org[0]), column(from.shear.org[1]), column(from.shear.org[2]),
-             column(from.shear.shear_x), column(from.shear.shear_y)}};
+             column(far_org[0]), column(far_org[1])},
+            {column(far_org[2]), column(from.hit.tnear), column(best.t), column(from.shear.org[0]),
+             column(from.shear.org[1]), column(from.shear.org[2]), column(from.shear.shear_x),
+             column(from.shear.shear_y)}};
         for (int half = 0; half < 2; ++half) {
             Floats8 rows[8];
             for (int i = 0; i < 8; ++i) rows[i] = *as_row(columns[half][i]);

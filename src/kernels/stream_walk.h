@@ -121,16 +121,15 @@ private:
         }
         /// The children that the ray meets; in `enter` where.
         PACKET_INLINE Mask<kWideSize, Isa> meets(const StreamRay& ray, F& enter) const {
-            F exit;
+            F exit(ray.best_t);
             enter = ray.tnear;
             for (int a = 0; a < 3; ++a) {
                 const F inv_dir(ray.inv_dir[a]);
-                const F t_far = multiply_subtract(far[a], inv_dir, F(ray.far_shift[a]));
                 enter = max(multiply_subtract(near[a], inv_dir, F(ray.near_shift[a])), enter);
-                exit = a == 0 ? t_far : min(exit, t_far);
+                exit = min((far[a] - F(ray.far_org[a])) * inv_dir, exit);
             }
-            // if (enter > min(exit, best_t)) the ray misses; equal must pass, for the tie rule
-            return enter <= min(exit, F(ray.best_t));
+            // if (enter > exit) the ray misses; equal must pass, for the tie rule
+            return enter <= exit;
         }
     };
 
