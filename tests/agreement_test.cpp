@@ -100,8 +100,9 @@ TEST_CASE("rays that start or end ever farther away, or never end") {
             const float x = static_cast<float>(i % 16) / 16.0f - 0.5f;
             const float y = static_cast<float>(i / 16 % 16) / 16.0f - 0.5f;
             // So near each other that they are taken for coherent, and go by tiles if asked to.
-            const auto block = static_cast<float>(rays.size() / 256);
-            const glm::vec3 centre = 0.2f * (std::cos(block) * side + std::sin(block) * up);
+            const std::size_t block = rays.size() / 256;
+            const auto angle = static_cast<float>(block);
+            const glm::vec3 centre = 0.2f * (std::cos(angle) * side + std::sin(angle) * up);
             const glm::vec3 place = middle + size * (centre + 0.1f * (x * side + y * up));
             Ray ray;
             switch (i / 256) {
@@ -130,8 +131,9 @@ TEST_CASE("the first rays of a stream can hit nothing") {
     const glm::vec3 eye = box.upper + glm::vec3(5.0f, 1.0f, 1.5f) * box.extent();
     std::vector<Ray> rays;
     for (int i = 0; i < 64; ++i) {
-        const glm::vec3 place(0.5f, 0.3f + 0.05f * static_cast<float>(i % 8),
-                              0.3f + 0.05f * static_cast<float>(i / 8));
+        const int column = i % 8, row = i / 8;
+        const glm::vec3 place(0.5f, 0.3f + 0.05f * static_cast<float>(column),
+                              0.3f + 0.05f * static_cast<float>(row));
         rays.push_back(aim(eye, box.lower + place * box.extent()));
         if (i < 16) rays.back().tfar = -1.0f;
     }
