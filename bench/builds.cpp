@@ -13,6 +13,7 @@
 #include <generate.h>
 #include <timing.h>
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <string>
@@ -42,6 +43,7 @@ struct Builder {
     Rival rival;  ///< whom it is compared with: the next one, which spends about as much on a tree
 };
 using Builders = std::array<Builder, 7>;
+using Peaks = std::array<std::size_t, 7>;
 
 [[nodiscard]] std::size_t bytes_of_arrays(const TriangleMesh& mesh) {
     return mesh.positions.size() * sizeof(mesh.positions[0]) +
@@ -78,17 +80,18 @@ Builders all_builders() {
 }
 
 /// What each builder needs at most, but for the arrays, which both sides copy.
-std::array<std::size_t, 7> peaks_of(const Builders& builders, const Scene& scene) {
-    std::array<std::size_t, 7> out{};
+Peaks peaks_of(const Builders& builders, const Scene& scene) {
+    const std::size_t arrays = bytes_of_arrays(scene.meshes()[0]);
+    Peaks out{};
     for (std::size_t i = 0; i < builders.size(); ++i) {
-        out[i] = peak_bytes_of([&] { (void)builders[i].build(scene); }) -
-                 bytes_of_arrays(scene.meshes()[0]);
+        const std::size_t peak = peak_bytes_of([&] { (void)builders[i].build(scene); });
+        out[i] = peak - std::min(peak, arrays);
     }
     return out;
 }
 
 void hold_contest(std::string_view kind, const Scene& scene, const Builders& builders,
-                  const std::array<std::size_t, 7>& peaks, const Options& options) {
+                  const Peaks& peaks, const Options& options) {
     const auto triangles = static_cast<double>(scene.triangle_count());
     std::array<std::vector<double>, 7> seconds;
     std::array<Built, 7> last{};
@@ -113,7 +116,7 @@ void run(const Options& options) {
     constexpr std::array<std::string_view, 4> kKinds = {"terrain", "city", "hairball", "soup"};
     const Builders builders = all_builders();
     std::vector<Scene> scenes;
-    std::vector<std::array<std::size_t, 7>> peaks;
+    std::vector<Peaks> peaks;
     // First, as these processes must be started before there are threads.
     for (const std::string_view kind : kKinds) {
         scenes.push_back(make_scene(tools::generate(kind, options.triangles)));

@@ -1,8 +1,8 @@
-// Large arrays that are freed wait here for the next ones of about their size. The newest are kept
-// as they are, as malloc does: to give them back and write to them anew cost a quarter of the time
-// in which random rays were sorted and traced. To the system the pages of the others are free for
-// the taking (MADV_FREE), but what it has not taken is not cleared again: clearing is a third of
-// the time in which a tree is built anew over fresh memory.
+// Large arrays that are freed wait here for the next ones, of their size down to half of it. The
+// newest are kept as they are, as malloc does: to give them back and write to them anew cost a
+// quarter of the time in which random rays were sorted and traced. To the system the pages of the
+// others are free for the taking (MADV_FREE), but what it has not taken is not cleared again:
+// clearing is a third of the time in which a tree is built anew over fresh memory.
 #include "core/aligned_vector.h"
 
 #include <algorithm>
