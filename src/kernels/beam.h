@@ -59,21 +59,22 @@ template <int N, class Isa>
 PACKET_INLINE void smallest_lanes(const Float<N, Isa> (&in)[8], float (&out)[8]) {
     static_assert(N % 8 == 0);
     using Eight = Float<8, Isa>;
-    Floats8 rows[8];
+    float rows[8][8];
+    const float* from[8];
     for (int i = 0; i < 8; ++i) {
         float lanes[N];
         in[i].store(lanes);
         Eight least = Eight::load(lanes);
         for (int k = 8; k < N; k += 8) least = min(least, Eight::load(lanes + k));
-        least.store(lanes);
-        rows[i] = *as_row(lanes);
+        least.store(rows[i]);
+        from[i] = rows[i];
     }
-    transpose(rows);
+    Floats8 columns[8];
+    transpose(from, columns);
     Eight column[8];
     for (int i = 0; i < 8; ++i) {
-        float lanes[8];
-        *as_row(lanes) = rows[i];
-        column[i] = Eight::load(lanes);
+        *as_row(rows[i]) = columns[i];
+        column[i] = Eight::load(rows[i]);
     }
     for (int step = 4; step > 0; step /= 2) {
         for (int i = 0; i < step; ++i) column[i] = min(column[i], column[i + step]);

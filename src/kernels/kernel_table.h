@@ -1,6 +1,7 @@
 // The kernels of one instruction set, as a table of plain functions that dispatch picks from.
 #pragma once
 
+#include "core/stream_key.h"
 #include "core/views.h"
 
 #include <packet/hit.h>
@@ -77,6 +78,10 @@ struct KernelTable {
     using Overlap = std::uint32_t (*)(const float (&triangle)[3][3], const float (&lower)[3][32],
                                       const float (&upper)[3][32], int count) noexcept;
 
+    /// What rays are sorted by to become streams: see kernels/stream_keys.h.
+    using StreamKeys = void (*)(const Ray* rays, std::size_t count, const OriginCells& cells,
+                                std::uint32_t* keys) noexcept;
+
     enum Kernel { kSingle, kPacket8, kPacket16, kTile, kStream, kKernelCount };
     enum Counting { kNotCounting, kCounting, kCountingCount };
 
@@ -84,6 +89,7 @@ struct KernelTable {
     Batch any[kKernelCount][kCountingCount];
     Treelet closest_treelet[kCountingCount];
     Treelet any_treelet[kCountingCount];
+    StreamKeys stream_keys;
     Closest<8> closest8;
     Closest<16> closest16;
     Any<8> any8;

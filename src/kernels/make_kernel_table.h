@@ -3,6 +3,7 @@
 
 #include "kernels/kernel_table.h"
 #include "kernels/stream_batch.h"
+#include "kernels/stream_keys.h"
 #include "kernels/trace_batch.h"
 #include "kernels/treelet_run.h"
 #include "kernels/triangle_box_axes.h"
@@ -30,6 +31,7 @@ constexpr KernelTable make_kernel_table() {
     table.closest_treelet[KT::kCounting] = run_treelet<Query::kClosest, Isa, Counters>;
     table.any_treelet[KT::kNotCounting] = run_treelet<Query::kAny, Isa, NoCounters>;
     table.any_treelet[KT::kCounting] = run_treelet<Query::kAny, Isa, Counters>;
+    table.stream_keys = find_stream_keys<Isa>;
     table.closest8 = closest_packet<8, Isa>;
     table.closest16 = closest_packet<16, Isa>;
     table.any8 = any_packet<8, Isa>;

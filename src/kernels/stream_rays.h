@@ -109,8 +109,7 @@ private:
              column(from.shear.shear_y)}};
         for (int half = 0; half < 2; ++half) {
             Floats8 rows[8];
-            for (int i = 0; i < 8; ++i) rows[i] = *as_row(columns[half][i]);
-            transpose(rows);
+            transpose(columns[half], rows);
             for (int i = 0; i < 8; ++i) *(as_row(out + i) + half) = rows[i];
         }
     }

@@ -175,10 +175,13 @@ template <int kCount, class Isa>
 PACKET_INLINE void gather_8_rays(const TraceBatch& batch, std::size_t begin,
                                  RayArrays<kCount, Isa>& out, int first) {
     static_assert(sizeof(Ray) == 8 * sizeof(float));
-    Floats8 rows[8];
-    for (std::size_t i = 0; i < 8; ++i) rows[i] = *as_row(batch.rays + place(batch, begin + i));
-    transpose(rows);
-    for (int i = 0; i < 8; ++i) *as_row(out.component[i] + first) = rows[i];
+    const float* rows[8];
+    for (std::size_t i = 0; i < 8; ++i) {
+        rows[i] = reinterpret_cast<const float*>(batch.rays + place(batch, begin + i));
+    }
+    Floats8 columns[8];
+    transpose(rows, columns);
+    for (int i = 0; i < 8; ++i) *as_row(out.component[i] + first) = columns[i];
 }
 
 template <int kCount, class Isa>
@@ -216,16 +219,17 @@ PACKET_INLINE void scatter_8_hits(const TraceBatch& batch, std::size_t begin,
     static_assert(sizeof(Hit) == 6 * sizeof(float));
     std::int32_t mesh_id[8];
     meshes_of<Isa>(*batch.scene, hits.instance_id + first, mesh_id);
-    const Floats8 instances = *as_row(hits.instance_id + first);
-    Floats8 rows[8] = {*as_row(hits.t + first),
-                       *as_row(hits.u + first),
-                       *as_row(hits.v + first),
-                       *as_row(hits.prim_id + first),
-                       *as_row(mesh_id),
-                       instances,
-                       instances,
-                       instances};  // the last two are not stored
-    transpose(rows);
+    const auto* const instances = reinterpret_cast<const float*>(hits.instance_id + first);
+    const float* const columns[8] = {hits.t + first,
+                                     hits.u + first,
+                                     hits.v + first,
+                                     reinterpret_cast<const float*>(hits.prim_id + first),
+                                     reinterpret_cast<const float*>(mesh_id),
+                                     instances,
+                                     instances,
+                                     instances};  // the last two are not stored
+    Floats8 rows[8];
+    transpose(columns, rows);
     for (std::size_t i = 0; i < 8; ++i) store6(&batch.hits[place(batch, begin + i)], rows[i]);
 }
 

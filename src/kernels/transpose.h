@@ -26,24 +26,28 @@ PACKET_INLINE void store6(void* to, const Floats8& row) {
     *reinterpret_cast<Two*>(static_cast<float*>(to) + 4) = __builtin_shufflevector(row, row, 4, 5);
 }
 
-/// Transposes 8 x 8: pairs within quarters, quarters within halves, then the halves.
-PACKET_INLINE void transpose(Floats8 (&row)[8]) {
-    Floats8 pair[8], quarter[8];
-    for (int i = 0; i < 8; i += 2) {
-        pair[i] = __builtin_shufflevector(row[i], row[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-        pair[i + 1] = __builtin_shufflevector(row[i], row[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-    }
-    for (int i = 0; i < 8; i += 4) {
-        for (int k = 0; k < 2; ++k) {
-            const Floats8 &a = pair[i + k], &b = pair[i + k + 2];
-            quarter[i + 2 * k] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
-            quarter[i + 2 * k + 1] = __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+/// Transposes 8 x 8 numbers, whose rows begin at `from`. Halves of rows are put together as they
+/// are loaded, which takes no shuffle; then what is left are transposes of 4 x 4 in halves of
+/// registers.
+PACKET_INLINE void transpose(const float* const (&from)[8], Floats8 (&out)[8]) {
+    using Half [[gnu::vector_size(16), gnu::aligned(4), gnu::may_alias]] = float;
+    for (int column = 0; column < 8; column += 4) {
+        Floats8 row[4];  // of i and i + 4: four columns each
+        for (int i = 0; i < 4; ++i) {
+            const Half a = *reinterpret_cast<const Half*>(from[i] + column);
+            const Half b = *reinterpret_cast<const Half*>(from[i + 4] + column);
+            row[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
         }
-    }
-    for (int i = 0; i < 4; ++i) {
-        const Floats8 &a = quarter[i], &b = quarter[i + 4];
-        row[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11);
-        row[i + 4] = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
+        Floats8 pair[4];
+        for (int i = 0; i < 4; i += 2) {
+            pair[i] = __builtin_shufflevector(row[i], row[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+            pair[i + 1] = __builtin_shufflevector(row[i], row[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+        }
+        for (int k = 0; k < 2; ++k) {
+            const Floats8 &a = pair[k], &b = pair[k + 2];
+            out[column + 2 * k] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
+            out[column + 2 * k + 1] = __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+        }
     }
 }
 

@@ -13,8 +13,10 @@ std::size_t rays_per_stream_task(std::size_t rays, int threads) noexcept {
                       kLeastRaysForStreams, kMost);
 }
 
-RayTasks RayTasks::sorted(std::span<const Ray> rays, int threads) {
+RayTasks RayTasks::sorted(std::span<const Ray> rays, int threads,
+                          KernelTable::StreamKeys find_keys) {
     RayTasks out(rays, 0);
+    out.find_keys_ = find_keys;
     out.run_length_ = rays_per_stream_task(rays.size(), threads);
     out.orders_ = std::make_unique<StreamOrders>();
     return out;
@@ -24,7 +26,7 @@ void RayTasks::sort_together(const Parallel& parallel) {
     order_.resize(rays_.size());
     for (std::size_t first = 0; first < rays_.size(); first += kMostSortedTogether) {
         const std::size_t count = std::min(kMostSortedTogether, rays_.size() - first);
-        sort_many(rays_.subspan(first, count), std::span(order_).subspan(first, count),
+        sort_many(rays_.subspan(first, count), find_keys_, std::span(order_).subspan(first, count),
                   static_cast<std::uint32_t>(first), parallel);
     }
 }
@@ -48,7 +50,7 @@ void RayTasks::run(std::size_t task, TraceBatch batch,
         batch.order = pixels.data();
     } else if (orders_ != nullptr) {
         sorted = orders_->take();
-        batch.order = sorted->sort(rays_.subspan(first, batch.count)).data();
+        batch.order = sorted->sort(rays_.subspan(first, batch.count), find_keys_).data();
     }
     batch.rays = rays_.data() + first;
     if (batch.hits != nullptr) batch.hits += first;

@@ -26,7 +26,8 @@ public:
     /// `width` rays to a line of an image, or 0.
     RayTasks(std::span<const Ray> rays, int width) : rays_(rays), image_(rays.size(), width) {}
     /// Runs that are sorted, as streams need them.
-    [[nodiscard]] static RayTasks sorted(std::span<const Ray> rays, int threads);
+    [[nodiscard]] static RayTasks sorted(std::span<const Ray> rays, int threads,
+                                         KernelTable::StreamKeys find_keys);
     /// Sorts the rays of all runs, fewer than 2^32, together, but millions at a time, by all
     /// threads. 4 bytes a ray, and while it sorts 64 MB.
     void sort_together(const Parallel& parallel);
@@ -43,6 +44,7 @@ private:
     std::span<const Ray> rays_;
     PixelOrder image_;
     std::size_t run_length_ = kRaysPerTask;
+    KernelTable::StreamKeys find_keys_ = nullptr;
     std::unique_ptr<StreamOrders> orders_;  ///< if each run is sorted
     ScratchVector<std::uint32_t> order_;    ///< if all are
 };

@@ -33,14 +33,16 @@ public:
     using Kernels = KernelTable::Batch[KernelTable::kKernelCount][KernelTable::kCountingCount];
 
     SpanTrace(const Scene& scene, std::span<const Ray> rays, TraceQuery query,
-              const TraceOptions& options, Progress& progress)
+              const KernelTable& kernels, const TraceOptions& options, Progress& progress)
         : scene_(scene.accel()),
+          find_keys_(kernels.stream_keys),
           options_(options),
           rays_(rays),
           parallel_(options.threads, progress),
           plan_(make_plan(scene_, rays, query, options.mode, parallel_.threads())),
-          tasks_(plan_.sorting != Sorting::kNone ? RayTasks::sorted(rays, parallel_.threads())
-                                                 : RayTasks(rays, options.width)),
+          tasks_(plan_.sorting != Sorting::kNone
+                     ? RayTasks::sorted(rays, parallel_.threads(), find_keys_)
+                     : RayTasks(rays, options.width)),
           tries_(plan_.packets_below != 0.0 && tasks_.count() >= kLeastTasksForTries) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +
@@ -94,7 +96,7 @@ private:
     /// Threads take sweeps as long as there are any.
     void run_sweeps(const TraceBatch& batch, KernelTable::Treelet kernel) const {
         ScratchVector<std::uint32_t> order(batch.count);
-        sort_many({batch.rays, batch.count}, order, 0, parallel_);
+        sort_many({batch.rays, batch.count}, find_keys_, order, 0, parallel_);
         const auto threads = static_cast<std::size_t>(parallel_.threads());
         const TreeletJob job{batch, kernel, options_.queue_bytes / threads,
                              static_cast<std::uint32_t>(options_.queue_chunk)};
@@ -181,6 +183,7 @@ private:
     }
 
     const SceneAccel& scene_;
+    KernelTable::StreamKeys find_keys_;
     const TraceOptions& options_;
     std::span<const Ray> rays_;
     Parallel parallel_;
@@ -193,12 +196,12 @@ private:
 /// Calls run(trace, counting), and tells of its progress.
 template <class Run>
 void trace_span(const Scene& scene, std::span<const Ray> rays, TraceQuery query,
-                const TraceOptions& options, Run run) {
+                const KernelTable& kernels, const TraceOptions& options, Run run) {
     const auto counting =
         options.stats != nullptr ? KernelTable::kCounting : KernelTable::kNotCounting;
     with_progress(options.progress, "tracing", [&](Progress& progress) {
         progress.start_phase(1.0);
-        SpanTrace trace(scene, rays, query, options, progress);
+        SpanTrace trace(scene, rays, query, kernels, options, progress);
         run(trace, counting);
         return 0;
     });
@@ -216,26 +219,28 @@ void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit>
                    const TraceOptions& options) {
     check_sizes(rays.size(), hits.size(), "hits");
     const KernelTable& kernels = select_kernels(options.isa);
-    trace_span(scene, rays, TraceQuery::kClosest, options, [&](SpanTrace& trace, auto counting) {
-        if (trace.goes_by_treelets()) {
-            trace.run_by_treelets(kernels.closest_treelet[counting], hits.data(), nullptr);
-        } else {
-            trace.run(kernels.closest, hits.data(), nullptr);
-        }
-    });
+    trace_span(
+        scene, rays, TraceQuery::kClosest, kernels, options, [&](SpanTrace& trace, auto counting) {
+            if (trace.goes_by_treelets()) {
+                trace.run_by_treelets(kernels.closest_treelet[counting], hits.data(), nullptr);
+            } else {
+                trace.run(kernels.closest, hits.data(), nullptr);
+            }
+        });
 }
 
 void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size(), "results");
     const KernelTable& kernels = select_kernels(options.isa);
-    trace_span(scene, rays, TraceQuery::kAny, options, [&](SpanTrace& trace, auto counting) {
-        if (trace.goes_by_treelets()) {
-            trace.run_by_treelets(kernels.any_treelet[counting], nullptr, occluded.data());
-        } else {
-            trace.run(kernels.any, nullptr, occluded.data());
-        }
-    });
+    trace_span(
+        scene, rays, TraceQuery::kAny, kernels, options, [&](SpanTrace& trace, auto counting) {
+            if (trace.goes_by_treelets()) {
+                trace.run_by_treelets(kernels.any_treelet[counting], nullptr, occluded.data());
+            } else {
+                trace.run(kernels.any, nullptr, occluded.data());
+            }
+        });
 }
 
 Hit trace_closest(const Scene& scene, const Ray& ray) {
