@@ -1,7 +1,9 @@
-// Runs every operation of lanes.h once, for one instruction set. Compiled per instruction set, as
-// the kernels are; lanes_test.cpp compares what comes out with plain scalar code.
+// Runs every operation of lanes.h and child_words.h once, for one instruction set. Compiled per
+// instruction set, as the kernels are; lanes_test.cpp compares what comes out with plain scalar
+// code.
 #pragma once
 
+#include "kernels/child_words.h"
 #include "kernels/lanes.h"
 
 #include <cstdint>
@@ -26,9 +28,26 @@ struct LaneOutput {
     std::uint32_t any, none, count;
 };
 
+/// Children of a node, and how those of `met` are pushed: as they come, and by where they are
+/// entered.
+struct ChildInput {
+    float enter[kWideSize];
+    std::uint64_t word[kWideSize];
+    std::int32_t low[kWideSize], high[kWideSize];
+    std::uint32_t met;
+};
+struct ChildOutput {
+    std::uint64_t some[kWideSize + 1], some_joined[kWideSize + 1];
+    std::uint64_t ordered[kWideSize + 1], ordered_joined[kWideSize + 1];
+    std::int32_t child[kWideSize];
+    float enter[kWideSize];
+};
+
+using ChildProbe = void (*)(const ChildInput&, ChildOutput&);
 using LaneProbe = void (*)(const LaneInput&, LaneOutput&);
 struct LaneProbes {
     LaneProbe lanes1, lanes8, lanes16;
+    ChildProbe children;
 };
 
 LaneProbes lane_probes_scalar();
@@ -60,8 +79,20 @@ void probe_lanes(const LaneInput& in, LaneOutput& out) {
 }
 
 template <class Isa>
+void probe_children(const ChildInput& in, ChildOutput& out) {
+    using I = Int<kWideSize, Isa>;
+    const ChildWords<Isa> words(in.word), joined(I::load(in.low), I::load(in.high));
+    words.store(in.met, out.some), joined.store(in.met, out.some_joined);
+    const FarToNear order(Float<kWideSize, Isa>::load(in.enter),
+                          Mask<kWideSize, Isa>::from_bits(in.met));
+    words.store(order, out.ordered), joined.store(order, out.ordered_joined);
+    order.store(out.child);
+    for (int i = 0; i < kWideSize; ++i) out.enter[i] = order.enter[i];
+}
+
+template <class Isa>
 LaneProbes make_lane_probes() {
-    return {probe_lanes<1, Isa>, probe_lanes<8, Isa>, probe_lanes<16, Isa>};
+    return {probe_lanes<1, Isa>, probe_lanes<8, Isa>, probe_lanes<16, Isa>, probe_children<Isa>};
 }
 
 }  // namespace packet::test

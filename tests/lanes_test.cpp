@@ -1,4 +1,5 @@
-// Lanes of every instruction set, operation by operation and lane by lane, against scalar code.
+// Lanes of every instruction set, operation by operation and lane by lane, and how children are
+// pushed, against scalar code.
 #include "lane_probe.h"
 #include "random.h"
 
@@ -6,10 +7,13 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
+#include <vector>
 
 using namespace packet;
 using namespace packet::test;
@@ -99,6 +103,69 @@ void check_lanes(LaneProbe probe, int lanes) {
     }
 }
 
+ChildInput random_children(tools::Random& random) {
+    // What rays may enter a box at: any number.
+    constexpr float kEnters[] = {0.0f,   -0.0f,   1.0f,          -1.0f,
+                                 1e-45f, -1e-45f, 3.4028235e38f, -3.4028235e38f};
+    ChildInput in;
+    in.met = static_cast<std::uint32_t>(random.next() >> 40) & 0xFFu;
+    for (int i = 0; i < kWideSize; ++i) {
+        const float scattered = std::ldexp(static_cast<float>(random.next() >> 40),
+                                           static_cast<int>(random.next() % 60) - 40);
+        in.enter[i] = random.next() % 3 == 0   ? kEnters[random.next() % std::size(kEnters)]
+                      : random.next() % 2 == 0 ? scattered
+                                               : -scattered;
+        if ((in.met >> i & 1u) == 0 && random.next() % 2 == 0) in.enter[i] = NAN;
+        in.word[i] = random.next();
+        in.low[i] = static_cast<std::int32_t>(random.next());
+        in.high[i] = static_cast<std::int32_t>(random.next() >> 32);
+    }
+    return in;
+}
+
+/// As keys compare floats: without the last three bits, -0 before 0.
+std::int32_t rank_of(float enter) {
+    const auto bits = std::bit_cast<std::int32_t>(enter);
+    return (bits ^ (bits < 0 ? 0x7FFFFFFF : 0)) & ~7;
+}
+
+void check_children(ChildProbe probe) {
+    tools::Random random(8);
+    for (int round = 0; round < 5000; ++round) {
+        CAPTURE(round);
+        const ChildInput in = random_children(random);
+        constexpr std::uint64_t kUntouched = 0x123456789ABCDEF0u;
+        ChildOutput out;
+        for (auto* words : {out.some, out.some_joined, out.ordered, out.ordered_joined}) {
+            words[kWideSize] = kUntouched;
+        }
+        probe(in, out);
+        std::vector<int> met;
+        for (int i = 0; i < kWideSize; ++i) {
+            if (bit(in.met, i)) met.push_back(i);
+        }
+        const auto joined = [&](int i) {
+            return std::uint64_t{static_cast<std::uint32_t>(in.high[i])} << 32 |
+                   static_cast<std::uint32_t>(in.low[i]);
+        };
+        for (std::size_t k = 0; k < met.size(); ++k) {
+            CHECK(out.some[k] == in.word[met[k]]);
+            CHECK(out.some_joined[k] == joined(met[k]));
+        }
+        std::ranges::stable_sort(met, std::greater{}, [&](int i) { return rank_of(in.enter[i]); });
+        for (std::size_t k = 0; k < met.size(); ++k) {
+            CHECK(out.child[k] == met[k]);
+            CHECK(out.ordered[k] == in.word[met[k]]);
+            CHECK(out.ordered_joined[k] == joined(met[k]));
+            CHECK(out.enter[k] <= in.enter[met[k]]);
+            CHECK(rank_of(out.enter[k]) == rank_of(in.enter[met[k]]));
+        }
+        for (const auto* words : {out.some, out.some_joined, out.ordered, out.ordered_joined}) {
+            CHECK(words[kWideSize] == kUntouched);
+        }
+    }
+}
+
 void check_isa(IsaId isa, LaneProbes (*probes)()) {
     if (!cpu_supports(isa)) {
         MESSAGE("skipped: " << to_string(isa) << " (not this CPU)");
@@ -107,6 +174,7 @@ void check_isa(IsaId isa, LaneProbes (*probes)()) {
     check_lanes(probes().lanes1, 1);
     check_lanes(probes().lanes8, 8);
     check_lanes(probes().lanes16, 16);
+    check_children(probes().children);
 }
 
 }  // namespace

@@ -258,8 +258,9 @@ TEST_CASE("shadow rays go by streams, and where most meet the same by packets, w
         const glm::vec3 light = box.lower + glm::vec3(0.4f, 3.0f, 0.3f) * box.extent();
         std::vector<Ray> rays;
         for (int i = 0; i < kSide * kSide; ++i) {
-            const glm::vec3 place(static_cast<float>(i % kSide) / kSide, 0.5f,
-                                  static_cast<float>(i / kSide) / kSide);
+            const int row = i / kSide, column = i % kSide;
+            const glm::vec3 place(static_cast<float>(column) / kSide, 0.5f,
+                                  static_cast<float>(row) / kSide);
             rays.push_back(aim(box.lower + place * box.extent(), light));
             rays.back().tfar = 1.0f;
         }

@@ -25,8 +25,6 @@ PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, std::int3
 /// Streams that take steps in turn: what one of them fetches arrives while the others walk.
 /// Measured: docs/benchmarking.md#streams.
 inline constexpr int kStreamsInTurn = 8;
-/// Smaller trees stay in the cache, where there is nothing to wait for.
-inline constexpr std::uint64_t kLeastBytesForTurns = 8 << 20;
 
 template <Query query, class Isa, class Stats>
 class StreamBatch {
@@ -39,31 +37,6 @@ public:
           walk_(tree_, stats_) {}
 
     PACKET_INLINE void trace() {
-        if (tree_.byte_count < kLeastBytesForTurns) {
-            trace_one_by_one();
-        } else {
-            trace_in_turn();
-        }
-    }
-
-private:
-    /// A stream, and which rays it has: `count` from `begin` on.
-    struct Turn {
-        Stream<Isa> stream;
-        std::size_t begin = 0;
-        int count = 0;
-    };
-
-    PACKET_INLINE void trace_one_by_one() {
-        Turn& turn = turns_[0];
-        WholeTree all;
-        while (start(turn)) {
-            while (walk_.step(turn.stream, all)) {
-            }
-            finish(turn);
-        }
-    }
-    PACKET_INLINE void trace_in_turn() {
         int walking = 0;
         for (Turn& turn : turns_) walking += start(turn) ? 1 : 0;
         WholeTree all;
@@ -75,6 +48,14 @@ private:
             }
         }
     }
+
+private:
+    /// A stream, and which rays it has: `count` from `begin` on.
+    struct Turn {
+        Stream<Isa> stream;
+        std::size_t begin = 0;
+        int count = 0;
+    };
 
     /// The next rays' stream; false if there are none left.
     PACKET_INLINE bool start(Turn& turn) {

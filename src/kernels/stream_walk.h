@@ -10,6 +10,7 @@
 // Pfreundt, Ebert. Efficient ray tracing kernels for modern CPU architectures. JCGT 2015.
 #pragma once
 
+#include "kernels/child_words.h"
 #include "kernels/prefetch.h"
 #include "kernels/stream_rays.h"
 
@@ -28,21 +29,21 @@ struct RayBits {
     }
 };
 
-/// A subtree to visit, by the rays that met its box. None enters it before `enter`.
-struct StreamEntry {
-    WideChild child;
-    RaySet rays;
-    float enter;
-};
-
 /// A stream on its way through a tree.
 template <class Isa>
 struct Stream {
     StreamRays<Isa> rays;
     RaySet looking = 0;  ///< rays that may still find something: for any-hit, that have not yet
+
+    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind, and eight
+    // are written at a time.
+    static constexpr int kStackSize = kMaxDepth * (kWideSize - 1) + 2 * kWideSize;
+    /// Subtrees to visit, the next one last: each by the rays that met its box, none of which
+    /// enters it before `enter` (for any-hit not known).
     int size = 0;
-    // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind.
-    StreamEntry stack[kMaxDepth * (kWideSize - 1) + kWideSize];
+    WideChild child[kStackSize];
+    RaySet set[kStackSize];
+    float enter[kStackSize];
 };
 
 /// Where streams that walk all of a tree may go. Other parts keep what `rays` would enter beyond
@@ -62,25 +63,26 @@ public:
     PACKET_INLINE void start(Stream<Isa>& stream, std::uint32_t root, RaySet entering) const {
         entering &= stream.looking;
         if (entering != 0) visit(stream, tree_.wide_nodes[root], entering);
+        fetch_next(stream);
     }
-    /// Visits what is on top of the stack; false if there is nothing. What it pushes is fetched,
-    /// and arrives while other streams take their steps.
+    /// Visits what is on top of the stack; false if there is nothing.
     template <class Part>
     PACKET_INLINE bool step(Stream<Isa>& stream, Part& part) const {
         RaySet active = 0;
-        const StreamEntry* top = nullptr;
         while (active == 0) {
             if (stream.size == 0) return false;
-            top = &stream.stack[--stream.size];
-            active = top->rays & stream.looking;
+            active = stream.set[--stream.size] & stream.looking;
         }
-        if (top->child.is_leaf()) {
-            meet_leaf(stream, {top->child.link, top->child.count}, active, top->enter);
-        } else if (!part.holds(top->child.link)) {
-            part.leave(top->child.link, active, top->enter);
+        const WideChild child = stream.child[stream.size];
+        const float enter = query == Query::kClosest ? stream.enter[stream.size] : 0.0f;
+        if (child.is_leaf()) {
+            meet_leaf(stream, {child.link, child.count}, active, enter);
+        } else if (!part.holds(child.link)) {
+            part.leave(child.link, active, enter);
         } else {
-            visit(stream, tree_.wide_nodes[top->child.link], active);
+            visit(stream, tree_.wide_nodes[child.link], active);
         }
+        fetch_next(stream);
         return true;
     }
     /// Walks what is below a node in the part.
@@ -95,6 +97,7 @@ public:
 private:
     using F = Float<kWideSize, Isa>;
     using I = Int<kWideSize, Isa>;
+    using Words = ChildWords<Isa>;
     static constexpr int N = kPacketLanes<Isa>;
     using Lanes = Float<N, Isa>;
 
@@ -167,20 +170,21 @@ private:
                 first_enter = select(meets, min(enter, first_enter), first_enter);
             }
         }
-        const std::uint32_t all = (1u << kWideSize) - 1;
-        std::uint32_t bits = all & ~((found[0] | found[1]) == I(0)).bits();
-        if (bits == 0) return;
-        std::int32_t half[2][kWideSize];
-        found[0].store(half[0]), found[1].store(half[1]);
-        float enter[kWideSize];
-        first_enter.store(enter);
-        const int bottom = stream.size;
-        for (; bits != 0; bits &= bits - 1) {
-            const int child = __builtin_ctz(bits);
-            const RaySet set = static_cast<std::uint32_t>(half[0][child]) |
-                               RaySet{static_cast<std::uint32_t>(half[1][child])} << 32;
-            push(stream, bottom, {node.child[child], set, enter[child]});
+        const auto met = ~((found[0] | found[1]) == I(0));
+        const std::uint32_t children = met.bits() & ((1u << kWideSize) - 1);
+        if (children == 0) return;
+        // For closest-hit the nearest comes last; any-hit takes them as they come.
+        const int top = stream.size;
+        if constexpr (query == Query::kClosest) {
+            const FarToNear order(first_enter, met);
+            Words(node.child).store(order, stream.child + top);
+            Words(found[0], found[1]).store(order, stream.set + top);
+            __builtin_memcpy(stream.enter + top, order.enter, sizeof(order.enter));
+        } else {
+            Words(node.child).store(children, stream.child + top);
+            Words(found[0], found[1]).store(children, stream.set + top);
         }
+        stream.size += __builtin_popcount(children);
     }
     /// For any-hit: each packet of rays meets one child after the other, of those that the beam
     /// meets.
@@ -197,21 +201,15 @@ private:
                 set |= RaySet{meets(packet, planes.slabs(packet), rays.best[p].t).bits()} << p * N;
             }
             set &= active;
-            if (set != 0) push(stream, stream.size, {node.child[child], set, 0.0f});
+            stream.child[stream.size] = node.child[child];
+            stream.set[stream.size] = set;
+            stream.size += set != 0 ? 1 : 0;
         }
     }
-
-    /// Pushes a child, for closest-hit after those of its node, from `bottom` on, that are entered
-    /// later. Any-hit takes them as they come.
-    PACKET_INLINE void push(Stream<Isa>& stream, int bottom, const StreamEntry& entry) const {
-        prefetch(tree_, entry.child);
-        int place = stream.size++;
-        if constexpr (query == Query::kClosest) {
-            for (; place > bottom && stream.stack[place - 1].enter < entry.enter; --place) {
-                stream.stack[place] = stream.stack[place - 1];
-            }
-        }
-        stream.stack[place] = entry;
+    /// What is visited next arrives while other streams take their steps. More would take turns
+    /// with the rays for the few lines that can be on their way.
+    PACKET_INLINE void fetch_next(const Stream<Isa>& stream) const {
+        if (stream.size != 0) prefetch(tree_, stream.child[stream.size - 1]);
     }
 
     PACKET_INLINE void meet_leaf(Stream<Isa>& stream, BlockRange range, RaySet active,

@@ -10,6 +10,7 @@
 
 #include "kernels/beam.h"
 #include "kernels/box.h"
+#include "kernels/child_words.h"
 #include "kernels/lone_lanes.h"
 #include "kernels/packet_slopes.h"
 #include "kernels/prefetch.h"
@@ -26,7 +27,6 @@ struct TileEntry {
     const WideNode* node;
     std::uint32_t child;
     std::uint32_t packets;
-    float depth;
 };
 
 /// The packets of a tile that walk together. Their directions are shared.
@@ -78,23 +78,21 @@ private:
     /// Pushes the children that packets may meet, for closest-hit the nearest last.
     PACKET_INLINE void push_children(const WideNode& node, std::uint32_t packets) {
         Float<kWideSize, Isa> depths;
-        std::uint32_t bits = beam_.meets(node, depths);
-        float depth[kWideSize];
-        depths.store(depth);
+        std::uint32_t children = beam_.meets(node, depths);
         const SlopeRanges<Isa> to = slopes_.to(node);
-        const int bottom = size_;
-        for (; bits != 0; bits &= bits - 1) {
-            const int child = __builtin_ctz(bits);
+        const auto push = [&](int child) {
             const std::uint32_t left = packets & slopes_.packets(to, child);
-            if (left == 0) continue;
-            prefetch(tree_, node.child[child]);
-            int place = size_++;
-            if constexpr (query == Query::kClosest) {
-                for (; place > bottom && stack_[place - 1].depth < depth[child]; --place) {
-                    stack_[place] = stack_[place - 1];
-                }
-            }
-            stack_[place] = {&node, static_cast<std::uint32_t>(child), left, depth[child]};
+            if (left != 0) prefetch(tree_, node.child[child]);
+            stack_[size_] = {&node, static_cast<std::uint32_t>(child), left};
+            size_ += left != 0 ? 1 : 0;
+        };
+        if constexpr (query == Query::kClosest) {
+            const FarToNear order(depths, Mask<kWideSize, Isa>::from_bits(children));
+            std::int32_t child[kWideSize];
+            order.store(child);
+            for (int i = 0; i < __builtin_popcount(children); ++i) push(child[i]);
+        } else {
+            for (; children != 0; children &= children - 1) push(__builtin_ctz(children));
         }
     }
 
@@ -213,7 +211,8 @@ private:
     std::uint32_t looking_ = 0;  ///< packets that may still find something
     M active_[kTilePackets<N>];
     int size_ = 0;
-    TileEntry stack_[kMaxDepth * (kWideSize - 1) + kWideSize];
+    TileEntry
+        stack_[kMaxDepth * (kWideSize - 1) + kWideSize + 1];  // one is written that is not kept
 };
 
 }  // namespace packet
