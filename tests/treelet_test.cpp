@@ -217,12 +217,17 @@ TEST_CASE("auto sweeps where the tree is beyond the cache and rays pay for fetch
     CHECK(!sweeps_beat_streams(100 * kMega, 10'000 * kMega, 200.0, 1));
 
     const TriangleMesh mesh = tools::make_hairball(600'000, 1);
-    const auto sweeps = [&](std::optional<std::size_t> treelet_bytes, std::size_t count) {
+    const auto sweeps = [&](std::optional<std::size_t> treelet_bytes, std::size_t count,
+                            bool scattered = true) {
         Scene scene = make_scene(mesh);
         BuildOptions build;
         build.treelet_bytes = treelet_bytes;
         scene.commit(build);
-        const auto rays = random_rays(scene.bounds(), count, 9);
+        const Bounds3f world = scene.bounds();
+        auto rays = random_rays(world, count, 9);
+        if (!scattered) {
+            for (Ray& ray : rays) ray.org = world.center();
+        }
         TraceOptions options;
         options.threads = 2;
         options.mode = Mode::kStream;
@@ -243,6 +248,7 @@ TEST_CASE("auto sweeps where the tree is beyond the cache and rays pay for fetch
         return closest.treelets.entries != 0;
     };
     CHECK(sweeps(std::nullopt, 200'000));
+    CHECK(!sweeps(std::nullopt, 200'000, false));
     CHECK(!sweeps(std::nullopt, 100'000));
     CHECK(!sweeps(0, 200'000));
     BuildOptions fast;

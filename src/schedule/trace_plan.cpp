@@ -39,11 +39,15 @@ bool has_treelets(const SceneView& scene) {
 
 TracePlan plan_treelets() { return {.kernel = KernelTable::kStream, .by_treelets = true}; }
 
+/// Whether neighbours do not start near each other, and are many.
+bool are_many_and_scattered(const SceneAccel& scene, std::span<const Ray> rays) {
+    return rays.size() >= kLeastRaysTogether && are_scattered(rays, scene.top.bounds);
+}
+
 TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
     constexpr std::size_t kMostTogether = 0xFFFFFFFF;
-    const bool together = rays.size() >= kLeastRaysTogether && rays.size() <= kMostTogether &&
-                          scene.stats.sah_cost >= kLeastCostTogether &&
-                          are_scattered(rays, scene.top.bounds);
+    const bool together = scene.stats.sah_cost >= kLeastCostTogether &&
+                          rays.size() <= kMostTogether && are_many_and_scattered(scene, rays);
     return {KernelTable::kStream, together ? Sorting::kTogether : Sorting::kByTask};
 }
 
@@ -81,7 +85,8 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
         if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles();
         return {KernelTable::kStream, Sorting::kByTask};
     }
-    if (has_treelets(scene.view) && rays.size() >= kLeastRaysTogether &&
+    // Rays that start near each other meet the same nodes by streams already.
+    if (has_treelets(scene.view) && are_many_and_scattered(scene, rays) &&
         sweeps_beat_streams(rays.size(), scene.view.instances[0].tree->byte_count,
                             scene.stats.sah_cost, threads)) {
         return plan_treelets();

@@ -38,7 +38,7 @@ struct TreeletJob {
 /// and so that all threads have as much to do.
 [[nodiscard]] std::size_t rays_per_sweep(std::size_t rays, std::size_t tree_bytes,
                                          int threads) noexcept;
-/// Whether `Mode::kAuto` traces incoherent rays so, not by streams: if the tree is beyond the
+/// Whether `Mode::kAuto` traces scattered rays so, not by streams: if the tree is beyond the
 /// cache, rays meet much of it, and each sweep has rays enough to pay for fetching it.
 [[nodiscard]] bool sweeps_beat_streams(std::size_t rays, std::size_t tree_bytes, double sah_cost,
                                        int threads) noexcept;
