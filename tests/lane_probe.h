@@ -82,7 +82,10 @@ template <class Isa>
 void probe_children(const ChildInput& in, ChildOutput& out) {
     using I = Int<kWideSize, Isa>;
     const ChildWords<Isa> words(in.word), joined(I::load(in.low), I::load(in.high));
-    words.store(in.met, out.some), joined.store(in.met, out.some_joined);
+    std::int32_t pushed[2 * kWideSize + 1] = {};  // stacks begin at multiples of 4
+    words.store(in.met, pushed + 1);
+    __builtin_memcpy(out.some, pushed + 1, sizeof(std::uint64_t) * kWideSize);
+    joined.store(in.met, out.some_joined);
     const FarToNear order(Float<kWideSize, Isa>::load(in.enter),
                           Mask<kWideSize, Isa>::from_bits(in.met));
     words.store(order, out.ordered), joined.store(order, out.ordered_joined);

@@ -104,9 +104,9 @@ void check_lanes(LaneProbe probe, int lanes) {
 }
 
 ChildInput random_children(tools::Random& random) {
-    // What rays may enter a box at: any number.
-    constexpr float kEnters[] = {0.0f,   -0.0f,   1.0f,          -1.0f,
-                                 1e-45f, -1e-45f, 3.4028235e38f, -3.4028235e38f};
+    // What rays may enter a box at: any number, and infinity.
+    constexpr float kEnters[] = {0.0f,    -0.0f,    1.0f,          -1.0f,         1e-45f,
+                                 -1e-45f, INFINITY, 3.4028235e38f, -3.4028235e38f};
     ChildInput in;
     in.met = static_cast<std::uint32_t>(random.next() >> 40) & 0xFFu;
     for (int i = 0; i < kWideSize; ++i) {

@@ -38,8 +38,12 @@ PACKET_INLINE void sort_descending(Ints8& a) {
 }
 
 /// The children of a node that are met, from the farthest to the nearest, and where they are
-/// entered (no NaN, after -inf), or a few ulp before that; behind them the others. Of children that
-/// are entered together the first one is farther.
+/// entered, or up to 7 ulp before that; behind them the others, of which that is no number. Of
+/// children that are entered together the first one is farther.
+///
+/// Those that are met must be entered at more than -inf, not NaN: else others come before them.
+/// Rays' tnear, which load_rays() moves to the least float, sees to that, since max(x, tnear) is
+/// tnear where x is NaN; in a beam all planes are numbers.
 struct FarToNear {
     Ints8 child;
     float enter[kWideSize];
@@ -85,7 +89,8 @@ public:
                        std::uint64_t{static_cast<std::uint32_t>(half[1][i])} << 32;
         }
     }
-    /// Those of `children`, as they come. All eight words of `to` are written.
+    /// Those of `children`, as they come. Up to eight words of `to`, whose address is a multiple of
+    /// 4, are written.
     PACKET_INLINE void store(std::uint32_t children, void* to) const {
         auto* out = static_cast<Word*>(to);
         for (int i = 0; i < kWideSize; ++i) {
@@ -93,7 +98,7 @@ public:
             out += children >> i & 1u;
         }
     }
-    /// All, in that order.
+    /// All eight, in that order.
     PACKET_INLINE void store(const FarToNear& order, void* to) const {
         std::int32_t child[kWideSize];
         order.store(child);
@@ -102,7 +107,7 @@ public:
     }
 
 private:
-    using Word [[gnu::may_alias]] = std::uint64_t;
+    using Word [[gnu::may_alias, gnu::aligned(4)]] = std::uint64_t;
     std::uint64_t word_[kWideSize];
 };
 

@@ -3,9 +3,13 @@
 #pragma once
 
 #include "core/direction_class.h"
+#include "core/stream_key.h"
 #include "kernels/lanes.h"
 
 namespace packet {
+
+/// A stream's key has room for an octant's classes as four.
+static_assert(kDirectionClasses / 3 * 4 <= 1 << (kStreamKeyBits - kStreamPlaceBits));
 
 /// Rays of more classes than this are bounced ones, whose beams would be wide: it does not pay to
 /// sort them.

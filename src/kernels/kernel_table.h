@@ -25,7 +25,7 @@ struct TraceBatch {
     TraceStats* stats;       ///< counted into by the counting kernels, else null
 };
 
-/// A ray that waits at a treelet, unless it has hit something before `enter` by then.
+/// A ray that waits at a treelet, unless (closest-hit) it has hit something before `enter` by then.
 struct QueuedRay {
     std::uint32_t ray;  ///< its index in TraceBatch::rays
     float enter;

@@ -8,8 +8,8 @@
 
 namespace packet {
 
-/// The lines of what is visited later are fetched when it is pushed, since scenes seldom fit into
-/// the second level's cache.
+/// The lines of what is visited later are fetched ahead, since scenes seldom fit into the second
+/// level's cache.
 PACKET_INLINE void prefetch(const TreeView& tree, const WideChild& child) {
     // No branch: whether a child is a leaf is anybody's guess.
     const auto* const leaf = reinterpret_cast<const char*>(tree.blocks + child.link / kBlockSize);

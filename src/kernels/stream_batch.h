@@ -69,7 +69,7 @@ private:
         next_ += static_cast<std::size_t>(turn.count);
         prefetch_rays(batch_, next_, kStreamRays);
         load_stream<query>(turn.stream, tree_, instance_id_, columns, turn.count);
-        walk_.start(turn.stream, 0, turn.stream.looking);
+        walk_.start(turn.stream, 0, turn.stream.looking, WholeTree());
         return true;
     }
     PACKET_INLINE void finish(const Turn& turn) {

@@ -1,4 +1,4 @@
-// Finds what rays are sorted by to become streams (core/stream_key.h), a packet of them at a time.
+// Finds what rays are sorted by to become streams (core/stream_key.h), eight at a time.
 #pragma once
 
 #include "core/stream_key.h"
@@ -47,15 +47,16 @@ template <class Isa>
 void find_stream_keys(const Ray* rays, std::size_t count, const OriginCells& cells,
                       std::uint32_t* keys) noexcept {
     constexpr int N = kSingleLanes;
-    constexpr std::size_t kAhead = 256;  // rays; what is behind the last ones is not read
+    constexpr std::size_t kAhead = 256;  // rays
     using F = Float<N, Isa>;
     const TraceBatch batch{nullptr, rays, nullptr, count, nullptr, nullptr, nullptr};
     RayArrays<N, Isa> arrays = {};
     for (std::size_t begin = 0; begin < count; begin += N) {
         const int lanes = count - begin < N ? static_cast<int>(count - begin) : N;
         const RayColumns columns = gather_rays(batch, begin, lanes, arrays);
-        // Two rays to a line.
-        for (int i = 0; i < N; i += 2) __builtin_prefetch(rays + begin + kAhead + i);
+        if (begin + kAhead + N <= count) {  // two rays to a line
+            for (int i = 0; i < N; i += 2) __builtin_prefetch(rays + begin + kAhead + i);
+        }
         F org[3], dir[3];
         for (int a = 0; a < 3; ++a) {
             org[a] = F::load(columns.component[a]);

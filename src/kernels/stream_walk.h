@@ -37,11 +37,11 @@ struct Stream {
 
     // Each of at most kMaxDepth nodes on the way down leaves at most 7 children behind, and eight
     // are written at a time.
-    static constexpr int kStackSize = kMaxDepth * (kWideSize - 1) + 2 * kWideSize;
+    static constexpr int kStackSize = kMaxDepth * (kWideSize - 1) + kWideSize;
     /// Subtrees to visit, the next one last: each by the rays that met its box, none of which
     /// enters it before `enter` (for any-hit not known).
     int size = 0;
-    WideChild child[kStackSize];
+    alignas(64) WideChild child[kStackSize];
     RaySet set[kStackSize];
     float enter[kStackSize];
 };
@@ -49,6 +49,7 @@ struct Stream {
 /// Where streams that walk all of a tree may go. Other parts keep what `rays` would enter beyond
 /// them: a node, and `enter` before which none does.
 struct WholeTree {
+    static constexpr bool kTakesTurns = true;  ///< with other streams
     static constexpr bool holds(std::uint32_t) { return true; }
     static constexpr void leave(std::uint32_t, RaySet, float) {}
 };
@@ -60,10 +61,13 @@ public:
     PACKET_INLINE StreamWalk(const TreeView& tree, Stats& stats) : tree_(tree), stats_(stats) {}
 
     /// Enters the subtree of a node with those of `entering` that are looking.
-    PACKET_INLINE void start(Stream<Isa>& stream, std::uint32_t root, RaySet entering) const {
+    template <class Part>
+    PACKET_INLINE void start(Stream<Isa>& stream, std::uint32_t root, RaySet entering,
+                             const Part&) const {
+        const int bottom = stream.size;
         entering &= stream.looking;
         if (entering != 0) visit(stream, tree_.wide_nodes[root], entering);
-        fetch_next(stream);
+        fetch<Part>(stream, bottom);
     }
     /// Visits what is on top of the stack; false if there is nothing.
     template <class Part>
@@ -73,8 +77,9 @@ public:
             if (stream.size == 0) return false;
             active = stream.set[--stream.size] & stream.looking;
         }
-        const WideChild child = stream.child[stream.size];
-        const float enter = query == Query::kClosest ? stream.enter[stream.size] : 0.0f;
+        const int bottom = stream.size;
+        const WideChild child = stream.child[bottom];
+        const float enter = query == Query::kClosest ? stream.enter[bottom] : 0.0f;
         if (child.is_leaf()) {
             meet_leaf(stream, {child.link, child.count}, active, enter);
         } else if (!part.holds(child.link)) {
@@ -82,14 +87,14 @@ public:
         } else {
             visit(stream, tree_.wide_nodes[child.link], active);
         }
-        fetch_next(stream);
+        fetch<Part>(stream, bottom);
         return true;
     }
     /// Walks what is below a node in the part.
     template <class Part>
     PACKET_INLINE void walk(Stream<Isa>& stream, std::uint32_t root, RaySet entering,
                             Part& part) const {
-        start(stream, root, entering);
+        start(stream, root, entering, part);
         while (step(stream, part)) {
         }
     }
@@ -207,9 +212,15 @@ private:
         }
     }
     /// What is visited next arrives while other streams take their steps. More would take turns
-    /// with the rays for the few lines that can be on their way.
-    PACKET_INLINE void fetch_next(const Stream<Isa>& stream) const {
-        if (stream.size != 0) prefetch(tree_, stream.child[stream.size - 1]);
+    /// with the rays for the few lines that can be on their way. A stream that is alone fetches all
+    /// that was pushed, from `bottom` on.
+    template <class Part>
+    PACKET_INLINE void fetch(const Stream<Isa>& stream, int bottom) const {
+        if constexpr (Part::kTakesTurns) {
+            if (stream.size != 0) prefetch(tree_, stream.child[stream.size - 1]);
+        } else {
+            for (int i = bottom; i < stream.size; ++i) prefetch(tree_, stream.child[i]);
+        }
     }
 
     PACKET_INLINE void meet_leaf(Stream<Isa>& stream, BlockRange range, RaySet active,

@@ -211,8 +211,7 @@ private:
     std::uint32_t looking_ = 0;  ///< packets that may still find something
     M active_[kTilePackets<N>];
     int size_ = 0;
-    TileEntry
-        stack_[kMaxDepth * (kWideSize - 1) + kWideSize + 1];  // one is written that is not kept
+    TileEntry stack_[kMaxDepth * (kWideSize - 1) + kWideSize];
 };
 
 }  // namespace packet

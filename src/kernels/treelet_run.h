@@ -10,6 +10,7 @@ namespace packet {
 
 /// What a stream may walk: nodes `begin` to `begin + count`. Keeps the links that lead out.
 struct OneTreelet {
+    static constexpr bool kTakesTurns = false;
     std::uint32_t begin = 0, count = 0xFFFFFFFF;
     TreeletExit* exits = nullptr;
     int exit_count = 0;

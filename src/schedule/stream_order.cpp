@@ -35,6 +35,9 @@ constexpr std::uint32_t low_digit(std::uint32_t item) noexcept {
 }
 constexpr std::uint32_t high_digit(std::uint32_t item) noexcept { return item >> kHighShift; }
 
+/// Indices of a run that are written at a time, the last ones beyond its end.
+constexpr std::uint32_t kRunStep = 16;
+
 /// Pieces that an array is gone through by side by side.
 constexpr std::size_t kPieces = 4;
 
@@ -45,28 +48,20 @@ public:
     explicit Pieces(std::size_t count) : count_(count) {
         while (kPieces << shift_ < count) ++shift_;
     }
-    [[nodiscard]] std::size_t length() const noexcept { return std::size_t{1} << shift_; }
     [[nodiscard]] std::size_t piece_of(std::size_t i) const noexcept { return i >> shift_; }
-    /// Items 0 to this of each piece have one of each other piece beside them.
-    [[nodiscard]] std::size_t complete() const noexcept {
-        const std::size_t before_last = (kPieces - 1) * length();
-        return count_ > before_last ? count_ - before_last : 0;
-    }
-    /// Calls take(i, piece) for the others.
-    template <class Take>
-    void for_rest(Take&& take) const {
-        for (std::size_t k = 0; k < kPieces; ++k) {
-            const std::size_t end = std::min(count_, (k + 1) * length());
-            for (std::size_t i = k * length() + complete(); i < end; ++i) take(i, k);
-        }
-    }
     /// Calls take(i, piece) for all.
     template <class Take>
     void for_each(Take&& take) const {
-        for (std::size_t i = 0; i < complete(); ++i) {
-            for (std::size_t k = 0; k < kPieces; ++k) take(k * length() + i, k);
+        const std::size_t length = std::size_t{1} << shift_, before_last = (kPieces - 1) * length;
+        // So many items of each piece have one of each other piece beside them.
+        const std::size_t complete = count_ > before_last ? count_ - before_last : 0;
+        for (std::size_t i = 0; i < complete; ++i) {
+            for (std::size_t k = 0; k < kPieces; ++k) take(k * length + i, k);
         }
-        for_rest(take);
+        for (std::size_t k = 0; k < kPieces; ++k) {
+            const std::size_t end = std::min(count_, (k + 1) * length);
+            for (std::size_t i = k * length + complete; i < end; ++i) take(i, k);
+        }
     }
 
 private:
@@ -132,7 +127,7 @@ std::span<const std::uint32_t> StreamOrder::sort(std::span<const Ray> rays,
                                                  KernelTable::StreamKeys find_keys) {
     PACKET_ASSERT(rays.size() <= kMostRays);
     constexpr std::size_t kLeastRunLength = 4;
-    items_.resize(rays.size()), scratch_.resize(rays.size());
+    items_.resize(rays.size()), scratch_.resize(rays.size() + kRunStep);
     if (rays.empty()) return {};
     find_keys(rays.data(), rays.size(), find_origin_cells(rays), items_.data());
     std::uint32_t runs = 1;
@@ -147,9 +142,8 @@ std::span<const std::uint32_t> StreamOrder::sort_rays() {
 }
 
 std::span<const std::uint32_t> StreamOrder::sort_runs(std::size_t count) {
-    // Where runs end nobody can guess: nothing branches on it.
-    constexpr std::uint32_t kStep = 16;
-    begins_.resize(count + 1), scratch_.resize(items_.size() + kStep);
+    // Where runs end nobody can guess: hardly anything branches on it.
+    begins_.resize(count + 1);
     begins_[0] = 0;
     std::size_t run = 0;
     for (std::size_t i = 0; i < items_.size(); ++i) {
@@ -164,8 +158,8 @@ std::span<const std::uint32_t> StreamOrder::sort_runs(std::size_t count) {
     std::uint32_t* out = scratch_.data();
     for (const std::uint32_t which : sorted) {
         const std::uint32_t begin = begins_[which], length = begins_[which + 1] - begin;
-        for (std::uint32_t done = 0; done < length; done += kStep) {
-            for (std::uint32_t i = 0; i < kStep; ++i) out[done + i] = begin + done + i;
+        for (std::uint32_t done = 0; done < length; done += kRunStep) {
+            for (std::uint32_t i = 0; i < kRunStep; ++i) out[done + i] = begin + done + i;
         }
         out += length;
     }

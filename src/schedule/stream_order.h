@@ -24,7 +24,7 @@ class StreamOrder {
 public:
     static constexpr std::size_t kMostRays = 16384;
 
-    /// The indices of `rays`, kMostRays at most, in that order, until the next call. O(n) time, 12
+    /// The indices of `rays`, kMostRays at most, in that order, until the next call. O(n) time, 9
     /// bytes a ray.
     [[nodiscard]] std::span<const std::uint32_t> sort(std::span<const Ray> rays,
                                                       KernelTable::StreamKeys find_keys);
