@@ -161,7 +161,7 @@ TEST_CASE("runs of rays are sorted as single ones are") {
     StreamOrder order;
     for (const std::size_t count : kCounts) {
         // Shorter ones than pay, just about as long, and longer than are written at a time.
-        for (const std::size_t longest : {3, 8, 15, 70, 20'000}) {
+        for (const std::size_t longest : {3u, 8u, 15u, 70u, 20'000u}) {
             const std::vector<Ray> rays = runs_of_rays(world, count, longest);
             CHECK(std::ranges::equal(order.sort(rays, default_keys()), expected_order(rays)));
         }
