@@ -30,7 +30,7 @@ struct Probe {
                                                     const TriangleBlock& block, int lane,
                                                     std::uint32_t active, BestHits<N, Isa>& best) {
         const PacketLeaf<Query::kClosest, directions, N, Isa> leaf{ray, ray.shear.axis, 0, best};
-        leaf.meet(block, lane, Mask<N, Isa>::from_bits(active));
+        leaf.meet(block, 1u << lane, Mask<N, Isa>::from_bits(active));
     }
 };
 

@@ -15,14 +15,16 @@ inline constexpr int kMostLanes = 16;
 struct LaneInput {
     float a[kMostLanes], b[kMostLanes];
     std::int32_t i[kMostLanes], j[kMostLanes];
+    std::int32_t which[kMostLanes];  ///< from 0 to 7
     std::uint32_t bits;
 };
 
 struct LaneOutput {
     float add[kMostLanes], sub[kMostLanes], mul[kMostLanes], div[kMostLanes];
     float abs[kMostLanes], min[kMostLanes], max[kMostLanes], select[kMostLanes];
-    float broadcast[kMostLanes], masked_store[kMostLanes];
+    float broadcast[kMostLanes], masked_store[kMostLanes], picked[kMostLanes];
     std::int32_t int_select[kMostLanes], int_broadcast[kMostLanes], int_masked_store[kMostLanes];
+    std::int32_t int_picked[kMostLanes];
     std::uint32_t less, less_equal, greater, greater_equal, equal;
     std::uint32_t int_less, int_less_equal, int_equal, both, either, invert, from_bits;
     std::uint32_t any, none, count;
@@ -69,6 +71,8 @@ void probe_lanes(const LaneInput& in, LaneOutput& out) {
     b.store(out.masked_store), a.store(out.masked_store, m);
     select(m, i, j).store(out.int_select), I(in.i[0]).store(out.int_broadcast);
     j.store(out.int_masked_store), i.store(out.int_masked_store, m);
+    const I which = I::load(in.which);
+    pick(in.a, which).store(out.picked), pick(in.i, which).store(out.int_picked);
     out.less = (a < b).bits(), out.less_equal = (a <= b).bits(), out.equal = (a == b).bits();
     out.greater = (a > b).bits(), out.greater_equal = (a >= b).bits();
     out.int_less = (i < j).bits(), out.int_less_equal = (i <= j).bits();

@@ -35,6 +35,7 @@ LaneInput random_input(tools::Random& random) {
         in.b[lane] = random.next() % 4 == 0 ? in.a[lane] : number();
         in.i[lane] = static_cast<std::int32_t>(random.next() >> 32);
         in.j[lane] = random.next() % 4 == 0 ? in.i[lane] : static_cast<std::int32_t>(random.next());
+        in.which[lane] = static_cast<std::int32_t>(random.next() % 8);
     }
     in.bits = static_cast<std::uint32_t>(random.next() >> 40) & 0xFFFFu;
     return in;
@@ -60,6 +61,7 @@ void check_floats(const LaneInput& in, const LaneOutput& out, int lane) {
     CHECK(same(out.broadcast[lane], in.a[0]));
     CHECK(same(out.select[lane], bit(in.bits, lane) ? a : b));
     CHECK(same(out.masked_store[lane], bit(in.bits, lane) ? a : b));
+    CHECK(same(out.picked[lane], in.a[in.which[lane]]));
     CHECK(bit(out.less, lane) == (a < b));
     CHECK(bit(out.less_equal, lane) == (a <= b));
     CHECK(bit(out.greater, lane) == (a > b));
@@ -73,6 +75,7 @@ void check_others(const LaneInput& in, const LaneOutput& out, int lane) {
     CHECK(out.int_select[lane] == (m ? i : j));
     CHECK(out.int_broadcast[lane] == in.i[0]);
     CHECK(out.int_masked_store[lane] == (m ? i : j));
+    CHECK(out.int_picked[lane] == in.i[in.which[lane]]);
     CHECK(bit(out.int_less, lane) == (i < j));
     CHECK(bit(out.int_less_equal, lane) == (i <= j));
     CHECK(bit(out.int_equal, lane) == (i == j));

@@ -107,11 +107,11 @@ public:
             const M active = is_active(p);
             slope[0].extend(active, ray.shear.shear_x);
             slope[1].extend(active, ray.shear.shear_y);
-            const F z = ray.shear.org[2] * F(sign), speed = abs(F(1.0f) / ray.hit.scale_z);
+            const F z = ray.shear.org[2] * F(sign);
             first = min(first, select(active, z, first));
             looks_ahead = looks_ahead & (~active | (ray.hit.tnear >= F(0.0f)));
-            begin.extend(active, z + ray.hit.tnear * speed);
-            end.extend(active, z + best_[p].t * speed);
+            begin.extend(active, z + ray.hit.tnear * ray.speed);
+            end.extend(active, z + best_[p].t * ray.speed);
             for (int a = 0; a < 3; ++a) {
                 margin = max(margin, select(active, ray.hit.org[0][a] - ray.hit.org[1][a], margin));
                 starts_there = starts_there & (~active | (ray.shear.org[a] == F(out.origin[a])));
@@ -127,8 +127,8 @@ public:
         // The difference of the grown origins is twice the growth, which bounds a hit's rounding.
         out.margin = -4.0f * least[3];
         const float lowest[2] = {least[4], least[5]}, highest[2] = {-least[6], -least[7]};
-        anchor(out, lowest, highest, least[0] * sign, sign);
         out.has_origin = none(~starts_there);
+        anchor(out, lowest, highest, least[0] * sign, sign);
         out.is_sound = none(~looks_ahead) && extent(out) < kFarthest;  // false for NaN
         return out;
     }
@@ -189,8 +189,13 @@ private:
         const bool has_end = (out.end - begin * sign) * kUlps <= out.margin;  // false for inf, NaN
         const float plane[2] = {begin, has_end ? out.end * sign : begin};
         Crossing at[2];
-        cross(plane, at);
-        const bool is_after = !(has_end && at[1].spread() < at[0].spread());
+        bool is_after = true;
+        if (out.has_origin) {
+            for (int a = 0; a < 2; ++a) at[0].lower[a] = at[0].upper[a] = out.origin[a];
+        } else {
+            cross(plane, at);
+            is_after = !(has_end && at[1].spread() < at[0].spread());
+        }
         const Crossing& crossing = at[is_after ? 0 : 1];
         out.anchor = plane[is_after ? 0 : 1];
         out.away = is_after ? sign : -sign;

@@ -89,7 +89,7 @@ template <Query query, Directions directions, int N, class Isa, class Stats>
         const TriangleBlock& block = tree.blocks[i / kBlockSize];
         if (mailbox.knows(block.prim_id[i % kBlockSize])) continue;
         stats.triangles(lane_count);
-        leaf.meet(block, static_cast<int>(i % kBlockSize), best.t > Float<N, Isa>(kNever));
+        leaf.meet(block, 1u << i % kBlockSize, best.t > Float<N, Isa>(kNever));
     }
 }
 

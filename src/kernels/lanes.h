@@ -180,6 +180,24 @@ struct Int : LaneValues<Int<N, Isa>, std::int32_t, N, Isa> {
     }
 };
 
+/// Of eight numbers in memory the one that each lane of `which` tells, from 0 to 7.
+template <int N, class Isa>
+PACKET_INLINE Float<N, Isa> pick(const float* eight, const Int<N, Isa>& which) {
+    Float<N, Isa> out;
+    for (int i = 0; i < which.kCount; ++i) {
+        out.r[i] = LanesOf<N, Isa>::Reg::pick(eight, which.r[i]);
+    }
+    return out;
+}
+template <int N, class Isa>
+PACKET_INLINE Int<N, Isa> pick(const std::int32_t* eight, const Int<N, Isa>& which) {
+    Int<N, Isa> out;
+    for (int i = 0; i < which.kCount; ++i) {
+        out.r[i] = LanesOf<N, Isa>::Reg::pick(eight, which.r[i]);
+    }
+    return out;
+}
+
 /// Lanes of packets that may have as many as suit the CPU: those of its widest register.
 template <class Isa>
 inline constexpr int kPacketLanes = 8;

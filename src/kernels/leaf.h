@@ -22,7 +22,8 @@ struct BlockRange {
     }
 };
 
-/// A packet meets a triangle, broadcast to all lanes.
+/// A packet meets triangles of a block. Most rays may hit one of them at most; so each picks one,
+/// and all decide at once about what they picked.
 template <Query query, Directions directions, int N, class Isa>
 struct PacketLeaf {
     const PreparedRays<N, Isa>& ray;
@@ -30,28 +31,86 @@ struct PacketLeaf {
     std::int32_t instance_id;
     BestHits<N, Isa>& best;
 
-    /// The triangle of one lane of a block.
-    PACKET_INLINE void meet(const TriangleBlock& block, int lane, Mask<N, Isa> active) const {
-        const SameTriangle triangle{block, lane};
-        meet(triangle, triangle, active);
-    }
-    /// `corners` is the triangle, or relative to the rays' origin.
+    /// The lanes of `active` meet `triangles`, at least one, which they first see as `corners`.
     template <class Corners>
-    PACKET_INLINE void meet(const Corners& corners, const SameTriangle& triangle,
-                            Mask<N, Isa> active) const {
+    PACKET_INLINE void meet(const TriangleBlock& block, const Corners& corners,
+                            std::uint32_t triangles, Mask<N, Isa> active) const {
         for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
-            const auto sheared = shear<directions>(part(ray.shear, axis, i), corners);
-            const auto candidates = part(active, i) & sheared.may_hit();
-            if (none(candidates)) continue;
-            if constexpr (query == Query::kAny) {
-                best.occlude(
-                    i, decide_occluded<directions>(sheared, ray, best.t, candidates, triangle, i));
-            } else {
-                const auto hits =
-                    decide_hits(sheared, part(ray.hit, i), part(best.t, i), candidates, triangle);
-                if (none(hits.hit)) continue;
-                best.update(i, hits.hit, hits.t, hits.u, hits.v, triangle.prim_id(), instance_id);
-            }
+            meet_by_triangles(i, block, corners, triangles, part(active, i));
+        }
+    }
+    PACKET_INLINE void meet(const TriangleBlock& block, std::uint32_t triangles,
+                            Mask<N, Isa> active) const {
+        meet(block, BlockCorners{block}, triangles, active);
+    }
+    /// Better where they are fewer than the triangles.
+    template <class Corners>
+    PACKET_INLINE void meet_one_by_one(const TriangleBlock& block, const Corners& corners,
+                                       std::uint32_t triangles, Mask<N, Isa> active) const {
+        static_assert(directions == Directions::kShared);
+        for (int i = 0; i < LanesOf<N, Isa>::kRegisters; ++i) {
+            meet_by_rays(i, block, corners, triangles, part(active, i));
+        }
+    }
+
+private:
+    static constexpr int kPart = kPartSize<N, Isa>;
+    using PartMask = Mask<kPart, Isa>;
+    using PartInt = Int<kPart, Isa>;
+
+    /// The lanes of register i meet one triangle after the other.
+    template <class Corners>
+    PACKET_INLINE void meet_by_triangles(int i, const TriangleBlock& block, const Corners& corners,
+                                         std::uint32_t triangles, PartMask active) const {
+        const auto shear_ray = part(ray.shear, axis, i);
+        PartMask has_picked = PartMask::from_bits(0);
+        PartInt picked(0);
+        do {
+            const int lane = __builtin_ctz(triangles);
+            const auto sheared = shear<directions>(shear_ray, corners.one(lane));
+            const PartMask candidates = active & sheared.may_hit();
+            const PartMask again = candidates & has_picked;
+            if (any(again)) decide(i, sheared, again, SameTriangle{block, lane});
+            picked = select(candidates & ~has_picked, PartInt(lane), picked);
+            has_picked = has_picked | candidates;
+        } while ((triangles &= triangles - 1) != 0);
+        if (none(has_picked)) return;
+        const PickedTriangles<kPart, Isa> own{block, picked};
+        decide(i, shear<directions>(shear_ray, own), has_picked, own);
+    }
+    /// Each of them meets all triangles.
+    template <class Corners>
+    PACKET_INLINE void meet_by_rays(int i, const TriangleBlock& block, const Corners& corners,
+                                    std::uint32_t triangles, PartMask active) const {
+        std::uint32_t has_picked = 0, again = 0;
+        std::int32_t picked[kPart] = {};
+        for (std::uint32_t left = active.bits(); left != 0; left &= left - 1) {
+            const int lane = __builtin_ctz(left);
+            const PacketRay<N, Isa> one{ray, i * kPart + lane};
+            const auto sheared =
+                shear<Directions::kShared>(shear_of<kBlockSize, Isa>(one), corners.all());
+            const std::uint32_t candidates = sheared.may_hit().bits() & triangles;
+            picked[lane] = __builtin_ctz(candidates | 1u << (kBlockSize - 1));
+            has_picked |= (candidates != 0 ? 1u : 0u) << lane;
+            again |= candidates & (candidates - 1);
+        }
+        if (has_picked == 0) return;
+        const auto shear_ray = part(ray.shear, axis, i);
+        const PickedTriangles<kPart, Isa> own{block, PartInt::load(picked)};
+        decide(i, shear<directions>(shear_ray, own), PartMask::from_bits(has_picked), own);
+        if (again != 0) meet_by_triangles(i, block, corners, again, active);
+    }
+    template <class Triangles>
+    PACKET_INLINE void decide(int i, const ShearedTriangles<kPart, Isa>& sheared,
+                              PartMask candidates, const Triangles& triangles) const {
+        if constexpr (query == Query::kAny) {
+            best.occlude(
+                i, decide_occluded<directions>(sheared, ray, best.t, candidates, triangles, i));
+        } else {
+            const auto hits =
+                decide_hits(sheared, part(ray.hit, i), part(best.t, i), candidates, triangles);
+            if (none(hits.hit)) return;
+            best.update(i, hits.hit, hits.t, hits.u, hits.v, triangles.prim_id(), instance_id);
         }
     }
 };

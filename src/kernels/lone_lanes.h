@@ -7,31 +7,23 @@
 
 namespace packet {
 
-/// The rays of a packet, which ray_of(lane) picks, and their best hits.
-template <Query query, int N, class Isa, class RayOf>
+/// The rays of a packet, prepared to go alone, and their best hits.
+template <Query query, int N, class Isa>
 class LoneLanes {
 public:
-    PACKET_INLINE LoneLanes(const TreeView& tree, RayOf ray_of, std::int32_t instance_id,
-                            BestHits<N, Isa>& best)
-        : tree_(tree), ray_of_(ray_of), instance_id_(instance_id), best_(best) {
+    PACKET_INLINE LoneLanes(const TreeView& tree, const PreparedLanes (&rays)[N / kSingleLanes],
+                            std::int32_t instance_id, BestHits<N, Isa>& best)
+        : tree_(tree), rays_(rays), instance_id_(instance_id), best_(best) {
         best.t.store(best_t_);
     }
 
-    /// The lanes of `active` meet a block.
-    PACKET_INLINE void meet(const TriangleBlock& block, Mask<N, Isa> active) {
-        for (std::uint32_t left = active.bits(); left != 0; left &= left - 1) {
-            const int lane = __builtin_ctz(left);
-            if (query == Query::kAny && best_t_[lane] == kNever) continue;
-            meet(block, lane, ray_of_(lane));
-        }
-    }
     /// The lanes of `active` walk the subtree of `child`.
     template <class Stats>
     PACKET_INLINE void walk(const WideChild& child, Mask<N, Isa> active, Stats& stats) {
         for (std::uint32_t left = active.bits(); left != 0; left &= left - 1) {
             const int lane = __builtin_ctz(left);
             if (query == Query::kAny && best_t_[lane] == kNever) continue;
-            const SingleRay alone = ray_of_(lane);
+            const SingleRay alone(rays_[lane / kSingleLanes], lane % kSingleLanes);
             walk_wide_tree<query, Isa>(
                 tree_, alone, best_t_[lane], stats,
                 [&](std::uint32_t first, std::uint32_t item_count) {
@@ -47,8 +39,7 @@ public:
     }
 
 private:
-    template <class Ray>
-    PACKET_INLINE void meet(const TriangleBlock& block, int lane, const Ray& ray) {
+    PACKET_INLINE void meet(const TriangleBlock& block, int lane, const SingleRay& ray) {
         const auto shear = shear_of<kBlockSize, Isa>(ray);
         if constexpr (query == Query::kAny) {
             if (!is_occluded(shear, ray, best_t_[lane], block)) return;
@@ -63,7 +54,7 @@ private:
     }
 
     const TreeView& tree_;
-    RayOf ray_of_;
+    const PreparedLanes (&rays_)[N / kSingleLanes];
     std::int32_t instance_id_;
     BestHits<N, Isa>& best_;
     float best_t_[N];  ///< as in best_

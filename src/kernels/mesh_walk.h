@@ -47,15 +47,9 @@ private:
                                                          instance_id_, best_};
         for (std::uint32_t b = range.begin(); b < range.end(); ++b) {
             const TriangleBlock& block = tree_.blocks[b];
-            std::uint32_t triangles = range.lanes(b) & beam.meets(block);
+            const std::uint32_t triangles = range.lanes(b) & beam.meets(block);
             stats_.triangles(count(active) * __builtin_popcount(triangles));
-            if (count(active) < __builtin_popcount(triangles)) {
-                lone_lanes().meet(block, active);
-                continue;
-            }
-            for (; triangles != 0; triangles &= triangles - 1) {
-                leaf.meet(block, __builtin_ctz(triangles), active);
-            }
+            if (triangles != 0) leaf.meet(block, triangles, active);
         }
     }
 
@@ -64,16 +58,13 @@ private:
         static constexpr int kFewest = N / 4;
         MeshWalk& walk;
         PACKET_NOINLINE void operator()(const WideChild& child, Mask<N, Isa> active) const {
-            walk.lone_lanes().walk(child, active, walk.stats_);
+            walk.walk_alone(child, active);
         }
     };
-    PACKET_INLINE auto lone_lanes() {
+    PACKET_INLINE void walk_alone(const WideChild& child, Mask<N, Isa> active) {
         if (!are_prepared_) prepare_lanes<N, Isa>(tree_, ray_, lanes_);
         are_prepared_ = true;
-        const auto ray_of = [lanes = &lanes_[0]](int lane) {
-            return SingleRay(lanes[lane / kSingleLanes], lane % kSingleLanes);
-        };
-        return LoneLanes<query, N, Isa, decltype(ray_of)>(tree_, ray_of, instance_id_, best_);
+        LoneLanes<query, N, Isa>(tree_, lanes_, instance_id_, best_).walk(child, active, stats_);
     }
 
     const TreeView& tree_;

@@ -58,6 +58,7 @@ struct PreparedRays {
     F inv_dir[3], shift[2][3];
     int near_side[3];  ///< kShared: per axis, the plane of a box that is met first
     Directions directions;
+    F speed;  ///< along the longest axis, for a unit of t
     ShearRays<N, Isa> shear;
     HitRays<N, Isa> hit;
 };
@@ -250,6 +251,7 @@ PACKET_INLINE Float3<N, Isa> rotate_axes(const ShearRays<N, Isa>& ray,
             select(ray.z_is_x, p[0], select(ray.z_is_y, p[1], p[2]))};
 }
 
+/// After prepare_boxes().
 template <int N, class Isa>
 PACKET_INLINE void prepare_shear(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray) {
     ShearRays<N, Isa>& shear = out.shear;
@@ -259,7 +261,9 @@ PACKET_INLINE void prepare_shear(PreparedRays<N, Isa>& out, const RayLanes<N, Is
     const Float3<N, Isa> d = rotate_axes(shear, ray.dir);
     shear.shear_x = d.x / d.z;
     shear.shear_y = d.y / d.z;
-    out.hit.scale_z = Float<N, Isa>(1.0f) / d.z;
+    out.speed = abs(d.z);
+    // 1 / d.z: the longest axis is long enough.
+    out.hit.scale_z = rotate_axes(shear, out.hit.reciprocal).z;
 }
 
 /// All of it for a packet, whose `active` lanes are usable.

@@ -56,6 +56,10 @@ struct ScalarRegister {
     PACKET_INLINE static T select(M m, T a, T b) {
         return m ? a : b;
     }
+    template <class T>
+    PACKET_INLINE static T pick(const T* eight, I which) {
+        return eight[which];
+    }
     PACKET_INLINE static std::uint32_t bits(M m) { return m ? 1u : 0u; }
     PACKET_INLINE static M from_bits(std::uint32_t bits) { return (bits & 1u) != 0; }
 };
@@ -78,6 +82,39 @@ PACKET_INLINE __m256i as_int_mask(__m256 m) { return _mm256_castps_si256(m); }
 PACKET_INLINE std::uint32_t mask_bits(__mmask16 m) { return m; }
 PACKET_INLINE __mmask16 as_float_mask(__mmask16 m) { return m; }
 PACKET_INLINE __mmask16 as_int_mask(__mmask16 m) { return m; }
+#endif
+
+/// Of eight numbers in memory the one that each lane of `which` tells.
+PACKET_INLINE __m128i pick_lanes(const std::int32_t* eight, __m128i which) {
+    const auto* halves = reinterpret_cast<const __m128i*>(eight);
+    const __m128i first_bytes = _mm_setr_epi8(0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12);
+    const __m128i bytes = _mm_add_epi8(_mm_shuffle_epi8(_mm_slli_epi32(which, 2), first_bytes),
+                                       _mm_set1_epi32(0x03020100));
+    // Either half is asked for all of them: of a byte's number the shuffle looks at the last bits.
+    return _mm_blendv_epi8(_mm_shuffle_epi8(_mm_loadu_si128(halves), bytes),
+                           _mm_shuffle_epi8(_mm_loadu_si128(halves + 1), bytes),
+                           _mm_cmpgt_epi32(which, _mm_set1_epi32(3)));
+}
+PACKET_INLINE __m128 pick_lanes(const float* eight, __m128i which) {
+    return _mm_castsi128_ps(pick_lanes(reinterpret_cast<const std::int32_t*>(eight), which));
+}
+#if defined(__AVX2__)
+PACKET_INLINE __m256i pick_lanes(const std::int32_t* eight, __m256i which) {
+    const auto* all = reinterpret_cast<const __m256i*>(eight);
+    return _mm256_permutevar8x32_epi32(_mm256_loadu_si256(all), which);
+}
+PACKET_INLINE __m256 pick_lanes(const float* eight, __m256i which) {
+    return _mm256_permutevar8x32_ps(_mm256_loadu_ps(eight), which);
+}
+#endif
+#if defined(__AVX512F__)
+PACKET_INLINE __m512i pick_lanes(const std::int32_t* eight, __m512i which) {
+    const auto* all = reinterpret_cast<const __m256i*>(eight);
+    return _mm512_permutexvar_epi32(which, _mm512_castsi256_si512(_mm256_loadu_si256(all)));
+}
+PACKET_INLINE __m512 pick_lanes(const float* eight, __m512i which) {
+    return _mm512_permutexvar_ps(which, _mm512_castps256_ps512(_mm256_loadu_ps(eight)));
+}
 #endif
 
 /// Registers of xsimd's architecture `Arch`. A mask is one of floats; masks of integers are recast.
@@ -124,6 +161,12 @@ struct XsimdRegister {
     PACKET_INLINE static I either(I a, I b) { return a | b; }
     PACKET_INLINE static F select(M m, F a, F b) { return xsimd::select(m, a, b); }
     PACKET_INLINE static I select(M m, I a, I b) { return xsimd::select(recast(m), a, b); }
+    PACKET_INLINE static F pick(const float* eight, I which) {
+        return F(pick_lanes(eight, which.data));
+    }
+    PACKET_INLINE static I pick(const std::int32_t* eight, I which) {
+        return I(pick_lanes(eight, which.data));
+    }
     PACKET_INLINE static std::uint32_t bits(M m) { return mask_bits(m.data); }
 
     PACKET_INLINE static M from_bits(std::uint32_t bits) {
@@ -179,6 +222,10 @@ struct Avx512HalfRegister {
     PACKET_INLINE static I either(I a, I b) { return _mm256_or_si256(a, b); }
     PACKET_INLINE static F select(M m, F a, F b) { return _mm256_mask_blend_ps(m, b, a); }
     PACKET_INLINE static I select(M m, I a, I b) { return _mm256_mask_blend_epi32(m, b, a); }
+    PACKET_INLINE static F pick(const float* eight, I which) { return pick_lanes(eight, which); }
+    PACKET_INLINE static I pick(const std::int32_t* eight, I which) {
+        return pick_lanes(eight, which);
+    }
     PACKET_INLINE static std::uint32_t bits(M m) { return m; }
     PACKET_INLINE static M from_bits(std::uint32_t bits) { return static_cast<M>(bits); }
 };

@@ -262,9 +262,7 @@ private:
             const std::int32_t any_instance = 0;
             const PacketLeaf<query, Directions::kShared, N, Isa> leaf{rays.packet[p], rays.axis,
                                                                       any_instance, best};
-            for (std::uint32_t left = triangles; left != 0; left &= left - 1) {
-                leaf.meet(block, __builtin_ctz(left), mask);
-            }
+            leaf.meet(block, triangles, mask);
             const std::uint32_t hit = (~(best.t > Lanes(kNever))).bits() & lanes;
             stream.looking &= ~(RaySet{hit} << p * N);
         }

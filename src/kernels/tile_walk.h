@@ -11,7 +11,7 @@
 #include "kernels/beam.h"
 #include "kernels/box.h"
 #include "kernels/child_words.h"
-#include "kernels/lone_lanes.h"
+#include "kernels/leaf.h"
 #include "kernels/packet_slopes.h"
 #include "kernels/prefetch.h"
 
@@ -154,48 +154,39 @@ private:
         if ((lanes & to.open.bits()) != 0) [[unlikely]]
             lanes &= beam_.meets(block);
         if (lanes == 0) return;
-        // Pairs of packet and triangle, eight packets to a word: one loop over all of them ends
-        // once, where loops over each packet's triangles end when nobody can guess.
-        std::uint64_t pairs[kTilePackets<N> / 8] = {};
-        std::uint32_t by_rays = 0;
-        for (std::uint32_t left = packets; left != 0; left &= left - 1) {
-            const int p = __builtin_ctz(left);
-            const std::uint32_t triangles = lanes & slopes_.meets(to, p);
-            stats_.triangles(count(active_[p]) * __builtin_popcount(triangles));
-            const std::uint64_t is_few = count(active_[p]) < __builtin_popcount(triangles) ? 1 : 0;
-            pairs[p / 8] |= (triangles & (is_few - 1)) << 8 * (p % 8);
-            by_rays |= static_cast<std::uint32_t>(is_few) << p;
-        }
-        for (; by_rays != 0; by_rays &= by_rays - 1) meet_by_rays(block, __builtin_ctz(by_rays));
         if (has_origin_) {
-            const RelativeBlock relative(block, origin_, axis_, Isa());
-            meet_pairs(block, pairs, [&](int lane) { return RelativeTriangle{relative, lane}; });
+            meet_block(block, RelativeCorners(block, origin_, axis_, Isa()), to, lanes, packets);
         } else {
-            meet_pairs(block, pairs, [&](int lane) { return SameTriangle{block, lane}; });
+            meet_block(block, BlockCorners{block}, to, lanes, packets);
         }
     }
-    /// What of a triangle a packet meets first, corners_of(lane) tells.
-    template <class CornersOf>
-    PACKET_INLINE void meet_pairs(const TriangleBlock& block,
-                                  const std::uint64_t (&pairs)[kTilePackets<N> / 8],
-                                  CornersOf&& corners_of) {
-        for (int word = 0; word < kTilePackets<N> / 8; ++word) {
-            for (std::uint64_t left = pairs[word]; left != 0; left &= left - 1) {
-                const int pair = __builtin_ctzll(left), p = 8 * word + pair / 8, lane = pair % 8;
-                const PacketLeaf<query, Directions::kShared, N, Isa> leaf{rays_[p], axis_,
-                                                                          instance_id_, best_[p]};
-                leaf.meet(corners_of(lane), SameTriangle{block, lane}, active_[p]);
-            }
+    /// Its triangles of `lanes`, which packets first see as `corners`.
+    template <class Corners>
+    PACKET_INLINE void meet_block(const TriangleBlock& block, const Corners& corners,
+                                  const SlopeRanges<Isa>& to, std::uint32_t lanes,
+                                  std::uint32_t packets) {
+        // How many packets have triangles to meet, and which way, is anybody's guess: so they are
+        // sorted first.
+        std::uint32_t triangles[kTilePackets<N>], together = 0, one_by_one = 0;
+        for (; packets != 0; packets &= packets - 1) {
+            const int p = __builtin_ctz(packets);
+            triangles[p] = lanes & slopes_.meets(to, p);
+            const int rays = count(active_[p]), items = __builtin_popcount(triangles[p]);
+            stats_.triangles(rays * items);
+            one_by_one |= (rays < items ? 1u : 0u) << p;
+            together |= (0 < items && items <= rays ? 1u : 0u) << p;
+        }
+        for (; one_by_one != 0; one_by_one &= one_by_one - 1) {
+            const int p = __builtin_ctz(one_by_one);
+            leaf(p).meet_one_by_one(block, corners, triangles[p], active_[p]);
+        }
+        for (; together != 0; together &= together - 1) {
+            const int p = __builtin_ctz(together);
+            leaf(p).meet(block, corners, triangles[p], active_[p]);
         }
     }
-
-    /// The active rays of a packet meet a block one by one, each all of its triangles at once.
-    PACKET_NOINLINE void meet_by_rays(const TriangleBlock& block, int p) {
-        const auto ray_of = [packet = &rays_[p]](int lane) {
-            return PacketRay<N, Isa>{*packet, lane};
-        };
-        LoneLanes<query, N, Isa, decltype(ray_of)>(tree_, ray_of, instance_id_, best_[p])
-            .meet(block, active_[p]);
+    PACKET_INLINE PacketLeaf<query, Directions::kShared, N, Isa> leaf(int p) const {
+        return {rays_[p], axis_, instance_id_, best_[p]};
     }
 
     const TreeView& tree_;

@@ -134,34 +134,6 @@ struct SameTriangle {
     [[nodiscard]] PACKET_INLINE std::int32_t prim_id() const { return block.prim_id[lane]; }
 };
 
-/// The corners of a block's triangles less the origin that all rays of a tile share, axes in the
-/// order of their shear: found once for eight triangles, not for each of them and each packet. The
-/// bits are those that each lane would find, but for the sign of zeros, which decides nothing.
-struct RelativeBlock {
-    alignas(32) float v[3][3][kBlockSize];
-
-    template <class Isa>
-    PACKET_INLINE RelativeBlock(const TriangleBlock& block, const float (&org)[3],
-                                const int (&axis)[3], Isa) {
-        using F = Float<kBlockSize, Isa>;
-        for (int corner = 0; corner < 3; ++corner) {
-            for (int a = 0; a < 3; ++a)
-                (F::load(block.v[corner][axis[a]]) - F(org[a])).store(v[corner][a]);
-        }
-    }
-};
-
-/// One of its triangles, in all lanes.
-struct RelativeTriangle {
-    const RelativeBlock& block;
-    int lane;
-
-    template <class F>
-    PACKET_INLINE F get(int corner, int axis) const {
-        return block.v[corner][axis][lane];
-    }
-};
-
 /// A block's triangles, one a lane.
 struct BlockTriangles {
     const TriangleBlock& block;
@@ -172,14 +144,84 @@ struct BlockTriangles {
     }
 };
 
+/// Triangles of a block, in each lane the one that it has picked.
+template <int N, class Isa>
+struct PickedTriangles {
+    const TriangleBlock& block;
+    Int<N, Isa> which;
+    static_assert(kBlockSize == 8);
+
+    template <class F>
+    PACKET_INLINE F get(int corner, int axis) const {
+        return pick(block.v[corner][axis], which);
+    }
+    [[nodiscard]] PACKET_INLINE Int<N, Isa> prim_id() const { return pick(block.prim_id, which); }
+};
+
+/// A block as packets meet it.
+struct BlockCorners {
+    const TriangleBlock& block;
+
+    [[nodiscard]] PACKET_INLINE SameTriangle one(int lane) const { return {block, lane}; }
+    [[nodiscard]] PACKET_INLINE BlockTriangles all() const { return {block}; }
+};
+
+/// The corners of a block's triangles less the origin that all rays of a tile share, axes in the
+/// order of their shear: found once for eight triangles, not for each of them and each packet. The
+/// bits are those that each lane would find, but for the sign of zeros, which decides nothing.
+struct RelativeCorners {
+    alignas(32) float v[3][3][kBlockSize];
+
+    template <class Isa>
+    PACKET_INLINE RelativeCorners(const TriangleBlock& block, const float (&org)[3],
+                                  const int (&axis)[3], Isa) {
+        using F = Float<kBlockSize, Isa>;
+        for (int corner = 0; corner < 3; ++corner) {
+            for (int a = 0; a < 3; ++a)
+                (F::load(block.v[corner][axis[a]]) - F(org[a])).store(v[corner][a]);
+        }
+    }
+
+    struct One {
+        const RelativeCorners& corners;
+        int lane;
+
+        template <class F>
+        PACKET_INLINE F get(int corner, int axis) const {
+            return corners.v[corner][axis][lane];
+        }
+    };
+    struct All {
+        const RelativeCorners& corners;
+
+        template <class F>
+        PACKET_INLINE F get(int corner, int axis) const {
+            return F::load(corners.v[corner][axis]);
+        }
+    };
+    [[nodiscard]] PACKET_INLINE One one(int lane) const { return {*this, lane}; }
+    [[nodiscard]] PACKET_INLINE All all() const { return {*this}; }
+};
+template <class Triangles>
+inline constexpr bool kIsRelative = false;
+template <>
+inline constexpr bool kIsRelative<RelativeCorners::One> = true;
+template <>
+inline constexpr bool kIsRelative<RelativeCorners::All> = true;
+
 /// A corner seen from the ray: sheared so that the ray runs along z from the origin.
 template <Directions directions, int N, class Isa, class Triangles>
 PACKET_INLINE Float3<N, Isa> to_ray_space(const ShearRays<N, Isa>& ray, const Triangles& triangles,
                                           int corner) {
     using F = Float<N, Isa>;
-    const F d[3] = {triangles.template get<F>(corner, ray.axis[0]) - ray.org[0],
-                    triangles.template get<F>(corner, ray.axis[1]) - ray.org[1],
-                    triangles.template get<F>(corner, ray.axis[2]) - ray.org[2]};
+    F d[3];
+    for (int a = 0; a < 3; ++a) {
+        if constexpr (kIsRelative<Triangles>) {
+            d[a] = triangles.template get<F>(corner, a);
+        } else {
+            d[a] = triangles.template get<F>(corner, ray.axis[a]) - ray.org[a];
+        }
+    }
     Float3<N, Isa> p = {d[0], d[1], d[2]};
     if constexpr (directions == Directions::kMixed) p = rotate_axes(ray, d);
     return {p.x - ray.shear_x * p.z, p.y - ray.shear_y * p.z, p.z};
@@ -220,15 +262,6 @@ struct ShearedTriangles {
         return (F(0.0f) <= lowest) | (highest <= F(0.0f));  // false for NaN: no triangle
     }
 };
-
-template <Directions directions, int N, class Isa>
-PACKET_INLINE Float3<N, Isa> to_ray_space(const ShearRays<N, Isa>& ray,
-                                          const RelativeTriangle& triangle, int corner) {
-    using F = Float<N, Isa>;
-    const F z = triangle.get<F>(corner, 2);
-    return {triangle.get<F>(corner, 0) - ray.shear_x * z,
-            triangle.get<F>(corner, 1) - ray.shear_y * z, z};
-}
 
 template <Directions directions, int N, class Isa, class Triangles>
 PACKET_INLINE ShearedTriangles<N, Isa> shear(const ShearRays<N, Isa>& ray,
@@ -332,29 +365,29 @@ PACKET_INLINE TriangleHits<N, Isa> decide_hits(const ShearedTriangles<N, Isa>& s
 }
 
 /// Which of `candidates` hit, all computed anew: rare, so that registers need not be kept for it.
-template <Directions directions, int N, class Isa>
+template <Directions directions, int N, class Isa, class Triangles>
 PACKET_NOINLINE std::uint32_t decide_part(const PreparedRays<N, Isa>& ray,
                                           const Float<N, Isa>& best_t, std::uint32_t candidates,
-                                          const SameTriangle& triangle, int i) {
-    const auto sheared = shear<directions>(part(ray.shear, ray.shear.axis, i), triangle);
+                                          const Triangles& triangles, int i) {
+    const auto sheared = shear<directions>(part(ray.shear, ray.shear.axis, i), triangles);
     const auto lanes = Mask<kPartSize<N, Isa>, Isa>::from_bits(candidates);
-    return decide_hits(sheared, part(ray.hit, i), part(best_t, i), lanes, triangle).hit.bits();
+    return decide_hits(sheared, part(ray.hit, i), part(best_t, i), lanes, triangles).hit.bits();
 }
 
 /// For any-hit: which of `candidates`, lanes of register i that may hit, do.
-template <Directions directions, int N, class Isa, int kPart>
+template <Directions directions, int N, class Isa, int kPart, class Triangles>
 PACKET_INLINE Mask<kPart, Isa> decide_occluded(const ShearedTriangles<kPart, Isa>& sheared,
                                                const PreparedRays<N, Isa>& ray,
                                                const Float<N, Isa>& best_t,
                                                Mask<kPart, Isa> candidates,
-                                               const SameTriangle& triangle, int i) {
+                                               const Triangles& triangles, int i) {
     const auto verdicts = judge(sheared, part(ray.hit, i), part(best_t, i));
     const auto hit = candidates & verdicts.hit;
     const auto undecided = candidates & ~(verdicts.hit | verdicts.miss);
     if (none(undecided)) [[likely]]
         return hit;
     return hit | Mask<kPart, Isa>::from_bits(
-                     decide_part<directions>(ray, best_t, undecided.bits(), triangle, i));
+                     decide_part<directions>(ray, best_t, undecided.bits(), triangles, i));
 }
 
 }  // namespace packet
