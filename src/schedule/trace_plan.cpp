@@ -85,8 +85,10 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
         if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles();
         return {KernelTable::kStream, Sorting::kByTask};
     }
-    // Rays that start near each other meet the same nodes by streams already.
-    if (has_treelets(scene.view) && are_many_and_scattered(scene, rays) &&
+    // Rays that start near each other meet the same nodes by streams already, and any-hit rays are
+    // as fast by streams: docs/benchmarking.md#treelets.
+    if (query == TraceQuery::kClosest && has_treelets(scene.view) &&
+        are_many_and_scattered(scene, rays) &&
         sweeps_beat_streams(rays.size(), scene.view.instances[0].tree->byte_count,
                             scene.stats.sah_cost, threads)) {
         return plan_treelets();
