@@ -113,10 +113,11 @@ std::uint64_t ray_meets_wide_boxes(const StepInput& in) {
     using F = Float<kWideSize, Isa>;
     std::uint64_t met = 0;
     for_each_single<Isa>(in, [&](const SingleRay& ray) {
-        const WideRay<Isa> wide(ray);
+        const auto wide_ray = wide<Isa>(ray);
         for (std::size_t i = 0; i < in.wide_node_count; ++i) {
             F enter;
-            const std::uint32_t bits = wide.meets(in.tree.wide_nodes[i], F(kLargestFloat), enter);
+            const std::uint32_t bits =
+                wide_ray.meets(in.tree.wide_nodes[i], F(kLargestFloat), enter);
             met += static_cast<std::uint64_t>(__builtin_popcount(bits));
         }
     });

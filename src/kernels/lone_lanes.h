@@ -7,13 +7,13 @@
 
 namespace packet {
 
-/// The rays of a packet, prepared to go alone, and their best hits.
-template <Query query, int N, class Isa>
+/// The rays of a packet, ray_of(lane) each, and their best hits.
+template <Query query, int N, class Isa, class RayOf>
 class LoneLanes {
 public:
-    PACKET_INLINE LoneLanes(const TreeView& tree, const PreparedLanes (&rays)[N / kSingleLanes],
-                            std::int32_t instance_id, BestHits<N, Isa>& best)
-        : tree_(tree), rays_(rays), instance_id_(instance_id), best_(best) {
+    PACKET_INLINE LoneLanes(const TreeView& tree, const RayOf& ray_of, std::int32_t instance_id,
+                            BestHits<N, Isa>& best)
+        : tree_(tree), ray_of_(ray_of), instance_id_(instance_id), best_(best) {
         best.t.store(best_t_);
     }
 
@@ -23,7 +23,7 @@ public:
         for (std::uint32_t left = active.bits(); left != 0; left &= left - 1) {
             const int lane = __builtin_ctz(left);
             if (query == Query::kAny && best_t_[lane] == kNever) continue;
-            const SingleRay alone(rays_[lane / kSingleLanes], lane % kSingleLanes);
+            const auto alone = ray_of_(lane);
             walk_wide_tree<query, Isa>(
                 tree_, alone, best_t_[lane], stats,
                 [&](std::uint32_t first, std::uint32_t item_count) {
@@ -39,7 +39,8 @@ public:
     }
 
 private:
-    PACKET_INLINE void meet(const TriangleBlock& block, int lane, const SingleRay& ray) {
+    template <class Ray>
+    PACKET_INLINE void meet(const TriangleBlock& block, int lane, const Ray& ray) {
         const auto shear = shear_of<kBlockSize, Isa>(ray);
         if constexpr (query == Query::kAny) {
             if (!is_occluded(shear, ray, best_t_[lane], block)) return;
@@ -54,7 +55,7 @@ private:
     }
 
     const TreeView& tree_;
-    const PreparedLanes (&rays_)[N / kSingleLanes];
+    const RayOf& ray_of_;
     std::int32_t instance_id_;
     BestHits<N, Isa>& best_;
     float best_t_[N];  ///< as in best_

@@ -64,7 +64,11 @@ private:
     PACKET_INLINE void walk_alone(const WideChild& child, Mask<N, Isa> active) {
         if (!are_prepared_) prepare_lanes<N, Isa>(tree_, ray_, lanes_);
         are_prepared_ = true;
-        LoneLanes<query, N, Isa>(tree_, lanes_, instance_id_, best_).walk(child, active, stats_);
+        const auto ray_of = [&](int lane) {
+            return SingleRay(lanes_[lane / kSingleLanes], lane % kSingleLanes);
+        };
+        LoneLanes<query, N, Isa, decltype(ray_of)> lanes(tree_, ray_of, instance_id_, best_);
+        lanes.walk(child, active, stats_);
     }
 
     const TreeView& tree_;

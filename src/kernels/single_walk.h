@@ -13,19 +13,36 @@
 
 namespace packet {
 
+/// How a ray leaves boxes of nodes: docs/decisions/box-slack.md.
+enum class Exits { kContract, kQuick };
+
 /// A ray in all 8 lanes, as the boxes of children need it.
-template <class Isa>
+template <class Isa, Exits exits>
 class WideRay {
 public:
     using F = Float<kWideSize, Isa>;
 
     PACKET_INLINE explicit WideRay(const SingleRay& ray) : tnear_(ray.number(L::kTnear)) {
+        static_assert(exits == Exits::kContract);
         for (int a = 0; a < 3; ++a) {
             inv_dir_[a] = ray.number(L::kInvDir + a);
             near_shift_[a] = ray.number(L::kNearShift + a);
-            far_org_[a] = ray.number(L::kFarOrg + a);
+            far_[a] = ray.number(L::kFarOrg + a);
             near_planes_[a] = ray.index(L::kNearPlanes + a);
             far_planes_[a] = ray.index(L::kFarPlanes + a);
+        }
+    }
+    template <int N>
+    PACKET_INLINE explicit WideRay(const PacketRay<N, Isa>& ray)
+        : tnear_(ray(ray.packet.hit.tnear)) {
+        static_assert(exits == Exits::kQuick);
+        for (int a = 0; a < 3; ++a) {
+            const int near_side = ray.packet.near_side[a];
+            inv_dir_[a] = ray(ray.packet.inv_dir[a]);
+            near_shift_[a] = ray(ray.packet.shift[0][a]);
+            far_[a] = ray(ray.packet.shift[1][a]);
+            near_planes_[a] = (3 * near_side + a) * kWideSize;
+            far_planes_[a] = (3 * (1 - near_side) + a) * kWideSize;
         }
     }
     /// The children whose boxes the ray meets before `best_t`, and where it enters them by the
@@ -34,10 +51,15 @@ public:
         const float* planes = node.plane[0][0];
         F exit = best_t;
         for (int a = 0; a < 3; ++a) {
-            const F t_near =
-                multiply_subtract(F::load(planes + near_planes_[a]), inv_dir_[a], near_shift_[a]);
+            const F near = F::load(planes + near_planes_[a]);
+            const F far = F::load(planes + far_planes_[a]);
+            const F t_near = multiply_subtract(near, inv_dir_[a], near_shift_[a]);
             enter = a == 0 ? t_near : max(enter, t_near);
-            exit = min((F::load(planes + far_planes_[a]) - far_org_[a]) * inv_dir_[a], exit);
+            if constexpr (exits == Exits::kContract) {
+                exit = min((far - far_[a]) * inv_dir_[a], exit);
+            } else {
+                exit = min(multiply_subtract(far, inv_dir_[a], far_[a]), exit);
+            }
         }
         // if (max(enter, tnear) > exit) it misses; equal must pass, for the tie rule
         return (max(enter, tnear_) <= exit).bits();
@@ -46,9 +68,19 @@ public:
 private:
     using L = PreparedLanes;
 
-    F inv_dir_[3], near_shift_[3], far_org_[3], tnear_;
+    F inv_dir_[3], near_shift_[3], tnear_;
+    F far_[3];  ///< the origin that the ray leaves boxes by, or the shift
     std::ptrdiff_t near_planes_[3], far_planes_[3];
 };
+
+template <class Isa>
+PACKET_INLINE auto wide(const SingleRay& ray) {
+    return WideRay<Isa, Exits::kContract>(ray);
+}
+template <class Isa, int N>
+PACKET_INLINE auto wide(const PacketRay<N, Isa>& ray) {
+    return WideRay<Isa, Exits::kQuick>(ray);
+}
 
 /// Subtrees to visit, the nearest on top.
 class SingleStack {
@@ -128,20 +160,20 @@ PACKET_INLINE WideChild descend(const TreeView& tree, const WideNode& node,
 
 /// Calls leaf(first, count) for each leaf of the subtree of `next` whose box the ray meets before
 /// `best_t`, which leaf may lower; kNever ends the walk.
-template <Query query, class Isa, class Stats, class Leaf>
-PACKET_INLINE void walk_wide_tree(const TreeView& tree, const SingleRay& ray, const float& best_t,
+template <Query query, class Isa, class Ray, class Stats, class Leaf>
+PACKET_INLINE void walk_wide_tree(const TreeView& tree, const Ray& ray, const float& best_t,
                                   Stats& stats, Leaf&& leaf, WideChild next = {0, 0}) {
     using F = Float<kWideSize, Isa>;
     SingleStack stack;
     for (;;) {
         // Read anew after leaves, which need all registers.
-        const WideRay<Isa> wide(opaque(ray));
+        const auto wide_ray = wide<Isa>(opaque(ray));
         const F farthest(best_t);
         while (!next.is_leaf()) {
             const WideNode& node = tree.wide_nodes[next.link];
             stats.visit(1, 1);
             F enter;
-            const std::uint32_t bits = wide.meets(node, farthest, enter);
+            const std::uint32_t bits = wide_ray.meets(node, farthest, enter);
             if (bits != 0) {
                 next = descend<query>(tree, node, enter, bits, stack);
             } else if (!stack.pop(best_t, next)) {

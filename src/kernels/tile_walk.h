@@ -11,7 +11,7 @@
 #include "kernels/beam.h"
 #include "kernels/box.h"
 #include "kernels/child_words.h"
-#include "kernels/leaf.h"
+#include "kernels/lone_lanes.h"
 #include "kernels/packet_slopes.h"
 #include "kernels/prefetch.h"
 
@@ -66,8 +66,14 @@ public:
                 packets = active_packets(top);
                 if (packets == 0) continue;
                 node = &tree_.wide_nodes[child.link];
-                if (!child.is_leaf()) break;
-                meet_leaf({child.link, child.count}, packets);
+                if (child.is_leaf()) {
+                    meet_leaf({child.link, child.count}, packets);
+                } else if (is_lone(packets)) {
+                    walk_alone(child, __builtin_ctz(packets));
+                } else {
+                    count_visits(top, packets);
+                    break;
+                }
                 if (looking_ == 0) return;
                 packets = 0;
             } while (packets == 0);
@@ -75,6 +81,20 @@ public:
     }
 
 private:
+    // As few lanes of one packet go on as single rays, whose box tests are exact for each child.
+    // Measured: docs/benchmarking.md#tiles.
+    static constexpr int kFewest = 3;
+
+    [[nodiscard]] PACKET_INLINE bool is_lone(std::uint32_t packets) const {
+        return (packets & (packets - 1)) == 0 && count(active_[__builtin_ctz(packets)]) < kFewest;
+    }
+    PACKET_NOINLINE void walk_alone(const WideChild& child, int p) {
+        const auto ray_of = [&](int lane) { return PacketRay<N, Isa>{rays_[p], lane}; };
+        LoneLanes<query, N, Isa, decltype(ray_of)> lanes(tree_, ray_of, instance_id_, best_[p]);
+        lanes.walk(child, active_[p], stats_);
+        end_if_occluded(p);
+    }
+
     /// Pushes the children that packets may meet, for closest-hit the nearest last.
     PACKET_INLINE void push_children(const WideNode& node, std::uint32_t packets) {
         Float<kWideSize, Isa> depths;
@@ -97,8 +117,8 @@ private:
     }
 
     /// The packets to go on with: of a leaf those that meet its box, and in active_ their lanes
-    /// that do; of a node for closest-hit all from the first that does, since below it they are met
-    /// with smaller boxes.
+    /// that do; of a node for closest-hit all from the first that does, in active_ that one's,
+    /// since below it they are met with smaller boxes.
     PACKET_INLINE std::uint32_t active_packets(const TileEntry& entry) {
         std::uint32_t left = entry.packets & looking_, out = 0;
         if (left == 0) return 0;
@@ -110,24 +130,20 @@ private:
             const M active = meets(rays_[p], planes.slabs(rays_[p]), best_[p].t);
             if (query == Query::kClosest && !is_leaf) {
                 if (none(active)) continue;
-                stats_.visit(count(active), N);
-                count_visits(planes, left & (left - 1));
+                active_[p] = active;
                 return left;
             }
             // No branch from here on: which packets meet a box is anybody's guess.
-            const std::uint32_t is_met = any(active) ? 1 : 0;
-            if constexpr (Stats::kCounts) {
-                if (!is_leaf && is_met != 0) stats_.visit(count(active), N);
-            }
             active_[p] = active;
-            out |= is_met << p;
+            out |= (any(active) ? 1u : 0u) << p;
         }
         return out;
     }
-    /// Of packets that go along without being asked whether they meet the box.
-    PACKET_INLINE void count_visits(const BoxPlanes<Directions::kShared, N, Isa>& planes,
-                                    std::uint32_t packets) {
+    /// Also of packets that go along without being asked whether they meet the box.
+    PACKET_INLINE void count_visits(const TileEntry& entry, std::uint32_t packets) {
         if constexpr (Stats::kCounts) {
+            const BoxPlanes<Directions::kShared, N, Isa> planes(
+                *entry.node, static_cast<int>(entry.child), near_side_);
             for (; packets != 0; packets &= packets - 1) {
                 const int p = __builtin_ctz(packets);
                 const M active = meets(rays_[p], planes.slabs(rays_[p]), best_[p].t);
@@ -141,11 +157,11 @@ private:
             meet_block(tree_.blocks[b], range.lanes(b), packets);
         }
         if constexpr (query == Query::kAny) {
-            for (std::uint32_t left = packets; left != 0; left &= left - 1) {
-                const int p = __builtin_ctz(left);
-                if (none(best_[p].t > F(kNever))) looking_ &= ~(1u << p);
-            }
+            for (; packets != 0; packets &= packets - 1) end_if_occluded(__builtin_ctz(packets));
         }
+    }
+    PACKET_INLINE void end_if_occluded(int p) {
+        if (query == Query::kAny && none(best_[p].t > F(kNever))) looking_ &= ~(1u << p);
     }
     PACKET_INLINE void meet_block(const TriangleBlock& block, std::uint32_t lanes,
                                   std::uint32_t packets) {

@@ -51,8 +51,16 @@ TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
     return {KernelTable::kStream, together ? Sorting::kTogether : Sorting::kByTask};
 }
 
-/// Closest-hit, or any-hit of rays in the order in which they are to be traced.
-TracePlan plan_tiles() { return {.kernel = KernelTable::kTile, .packets_below = 0.9}; }
+/// Closest-hit, or any-hit of rays in the order in which they are to be traced. Packets are tried
+/// but where there is so little of a tree to a ray that rays of a tile meet the same: there tiles
+/// are faster, and tries only cost. Measured: docs/benchmarking.md#beside-embree.
+TracePlan plan_tiles(const SceneAccel& scene, std::span<const Ray> rays) {
+    constexpr std::size_t kLeastBytesPerRay = 500;
+    const bool may_lose =
+        !has_one_tree(scene.view) ||
+        scene.view.instances[0].tree->byte_count / kLeastBytesPerRay >= rays.size();
+    return {.kernel = KernelTable::kTile, .packets_below = may_lose ? 0.9 : 0.0};
+}
 
 /// Whether so many rays are worth sorting, and may be traced by streams.
 bool may_stream(const SceneAccel& scene, std::span<const Ray> rays) {
@@ -72,7 +80,7 @@ TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode
             if (may_stream(scene, rays) && choose_mode(rays, scene.top.bounds) != Mode::kTile) {
                 return plan_streams(scene, rays);
             }
-            return plan_tiles();
+            return plan_tiles(scene, rays);
         default: return {kernel_of(mode)};
     }
 }
@@ -82,7 +90,8 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
                         int threads) {
     const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
     if (is_coherent) {
-        if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles();
+        if (!may_stream(scene, rays) || query == TraceQuery::kClosest)
+            return plan_tiles(scene, rays);
         return {KernelTable::kStream, Sorting::kByTask};
     }
     // Rays that start near each other meet the same nodes by streams already, and any-hit rays are
