@@ -72,6 +72,44 @@ TEST_CASE("tiles of rays that do not cohere") {
     }
 }
 
+TEST_CASE("tiles whose rays are farther apart than triangles are large") {
+    constexpr int kSide = 32;
+    for (const tools::SceneKind& kind : tools::kSceneKinds) {
+        CAPTURE(kind.name);
+        Scene scene = make_scene(kind.make(40000, 5));
+        scene.commit();
+        const Bounds3f box = scene.bounds();
+        const glm::vec3 eye = box.upper + 0.5f * box.extent();
+        std::vector<Ray> rays;
+        for (int y = 0; y < kSide; ++y) {
+            for (int x = 0; x < kSide; ++x) {
+                const glm::vec3 part(static_cast<float>(x) / kSide, 0.5f,
+                                     static_cast<float>(y) / kSide);
+                rays.push_back(aim(eye, box.lower + part * box.extent()));
+                rays.back().tfar = 4.0f;
+            }
+        }
+        const std::vector<Hit> want = Oracle(scene).closest(rays);
+        TraceOptions options;
+        options.mode = Mode::kTile, options.width = kSide;
+        for (const IsaId isa : built_isas()) {
+            if (!cpu_supports(isa)) continue;
+            CAPTURE(to_string(isa));
+            options.isa = isa;
+            std::vector<Hit> got(rays.size());
+            trace_closest(scene, rays, got, options);
+            CHECK(count_differences(rays, want, got) == 0);
+            std::vector<std::uint8_t> occluded(rays.size(), 7);
+            trace_any(scene, rays, occluded, options);
+            std::size_t different = 0;
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+                different += occluded[i] != want[i].is_hit();
+            }
+            CHECK(different == 0);
+        }
+    }
+}
+
 TEST_CASE("rays at every vertex, edge and interior of a grid") {
     const glm::vec3 u(0.25f, 0.01f, 0.0f), v(-0.02f, 0.31f, 0.1f);
     TriangleMesh mesh = make_grid(12, 12, {-1.3f, -2.1f, 0.4f}, u, v);
