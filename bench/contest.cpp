@@ -2,6 +2,10 @@
 
 #include <timing.h>
 
+#include <algorithm>
+#include <numeric>
+#include <random>
+
 namespace packet::bench {
 namespace {
 
@@ -60,9 +64,15 @@ std::vector<Score> hold(const Contest& contest, MeshView mesh, const RaySet& set
         scores.push_back({&contender, agreement, {}});
         if (seconds >= kLongRun) scores.back().seconds.push_back(seconds);
     }
+    std::vector<std::size_t> order(scores.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::mt19937 random(1);
     Answers answers = room_for(set);
     for (int repeat = 1; repeat <= contest.repeats; ++repeat) {
-        for (Score& score : scores) {
+        // None always follows the same other, which may leave it a slower processor.
+        std::ranges::shuffle(order, random);
+        for (const std::size_t index : order) {
+            Score& score = scores[index];
             if (score.seconds.size() == static_cast<std::size_t>(repeat)) continue;
             const auto time = [&] {
                 return tools::seconds_of(
