@@ -37,7 +37,7 @@ public:
         : tnear_(ray(ray.packet.hit.tnear)) {
         static_assert(exits == Exits::kQuick);
         for (int a = 0; a < 3; ++a) {
-            const int near_side = ray.packet.near_side[a];
+            const std::ptrdiff_t near_side = ray.packet.near_side[a];
             inv_dir_[a] = ray(ray.packet.inv_dir[a]);
             near_shift_[a] = ray(ray.packet.shift[0][a]);
             far_[a] = ray(ray.packet.shift[1][a]);
