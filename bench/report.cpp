@@ -75,7 +75,8 @@ double Row::ratio() const { return mrays_per_s(auto_score()) / mrays_per_s(best(
 void print_head(const Report& report, std::span<const Contender> contenders) {
     fmt::print("\n{}: {} triangles; built in", report.scene, report.triangle_count);
     for (const Build& build : report.builds)
-        fmt::print("  {:.2f} s ({})", build.seconds, build.name);
+        fmt::print("  {:.2f} s, {:.1f} MB ({})", build.seconds,
+                   1e-6 * static_cast<double>(build.bytes), build.name);
     fmt::print("\nMrays/s; ours by {}, beside {}\n\nthreads  {:<8} {:<7}", to_string(default_isa()),
                embree_version(), "rays", "query");
     for (const Contender& contender : contenders) {
@@ -98,14 +99,18 @@ void print_row(const Row& row) {
 }
 
 nlohmann::json to_json(const Report& report) {
-    nlohmann::json builds, rows = nlohmann::json::array();
-    for (const Build& build : report.builds) builds[std::string(build.name)] = build.seconds;
+    nlohmann::json seconds, bytes, rows = nlohmann::json::array();
+    for (const Build& build : report.builds) {
+        seconds[std::string(build.name)] = build.seconds;
+        bytes[std::string(build.name)] = build.bytes;
+    }
     for (const Row& row : report.rows) rows.push_back(to_json(row));
     return {{"scene", report.scene},
             {"triangles", report.triangle_count},
             {"isa", to_string(default_isa())},
             {"embree", embree_version()},
-            {"build_seconds", std::move(builds)},
+            {"build_seconds", std::move(seconds)},
+            {"build_bytes", std::move(bytes)},
             {"results", std::move(rows)}};
 }
 

@@ -35,6 +35,7 @@ struct Row {
 struct Build {
     std::string_view name;
     double seconds;
+    std::size_t bytes;  ///< of what is traced
 };
 
 struct Report {

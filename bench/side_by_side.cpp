@@ -49,7 +49,8 @@ public:
         : scene_(make_scene(load_gltf(path).scene.flatten())) {
         report_.scene = path.filename().string();
         report_.triangle_count = mesh().triangles.size();
-        report_.builds.push_back({"ours", tools::seconds_of([&] { scene_.commit(build); })});
+        const double seconds = tools::seconds_of([&] { scene_.commit(build); });
+        report_.builds.push_back({"ours", seconds, scene_.build_stats().bytes});
         for (const ModeName& mode : mode_names()) {
             if (mode.mode == Mode::kTreelet) continue;  // for larger scenes: packet_large
             contenders_.push_back(our_contender(scene_, mode));
@@ -71,7 +72,7 @@ public:
 private:
     void add_embree(EmbreeQuality quality, std::string_view name, EmbreeTest test) {
         const EmbreeScene scene(mesh(), quality, test);
-        report_.builds.push_back({name, scene.build().seconds});
+        report_.builds.push_back({name, scene.build().seconds, scene.build().bytes});
         for (const EmbreeModeName& mode : embree_modes()) {
             contenders_.push_back(embree_contender(scene, mode, name));
         }

@@ -14,9 +14,11 @@ namespace packet {
 
 /// The acceleration structures. They differ in how they are built, not in what they answer.
 enum class AccelKind : std::uint8_t {
-    kBvh,          ///< bounding volume hierarchy by the binned surface area heuristic
-    kBvhMidpoint,  ///< the same, split at the middle of the centroids
-    kBvhMorton,    ///< the same, by the Morton codes of the centroids: the fastest to build
+    /// bounding volume hierarchy by the binned surface area heuristic; then large subtrees move to
+    /// where that expects less
+    kBvh,
+    kBvhMidpoint,  ///< one split at the middle of the centroids
+    kBvhMorton,    ///< one by the Morton codes of the centroids: the fastest to build
     kBvhSpatial,   ///< as kBvh, but cutting triangles where nodes would overlap
     kKdMidpoint,   ///< k-d tree, cells cut in the middle, axes in turn
     kKdMedian,     ///< k-d tree, cells cut at the median of what they hold, axes in turn

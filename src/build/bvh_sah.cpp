@@ -4,6 +4,7 @@
 
 #include "build/grid_space.h"
 #include "build/object_split.h"
+#include "build/reinsertion.h"
 #include "build/split.h"
 
 #include <algorithm>
@@ -123,7 +124,10 @@ bool all_fit(std::span<const Leaf> leaves, std::span<const NodeRange> cells) {
 
 Hierarchy build_bvh_sah(ScratchVector<Reference> references, const BuildOptions& options,
                         const Parallel& parallel) {
-    return TopDownBuilder(std::move(references), 0, parallel, SahSplit(options, parallel)).build();
+    Hierarchy out =
+        TopDownBuilder(std::move(references), 0, parallel, SahSplit(options, parallel)).build();
+    reinsert_subtrees(out, parallel);
+    return out;
 }
 
 Hierarchy build_bvh_sah_by_cells(ScratchVector<Reference> references, const BuildOptions& options,
@@ -140,8 +144,11 @@ Hierarchy build_bvh_sah_by_cells(ScratchVector<Reference> references, const Buil
     const std::vector<Leaf> leaves = leaves_of(above);
     if (!all_fit(leaves, order.cells)) return build_plainly();
     references = {};
-    return TopDownBuilder(std::move(order.references), 0, parallel, SahSplit(options, parallel))
-        .build_below(above, leaves, order.cells);
+    Hierarchy out =
+        TopDownBuilder(std::move(order.references), 0, parallel, SahSplit(options, parallel))
+            .build_below(above, leaves, order.cells);
+    reinsert_subtrees(out, parallel);
+    return out;
 }
 
 }  // namespace packet

@@ -1,4 +1,5 @@
-// Bounding volume hierarchy by the surface area heuristic over bins of centroids.
+// Bounding volume hierarchy by the surface area heuristic over bins of centroids. Large subtrees
+// then move (reinsertion.h).
 #pragma once
 
 #include "build/hierarchy.h"

@@ -9,6 +9,7 @@
 
 #include "build/cell.h"
 #include "build/object_split.h"
+#include "build/reinsertion.h"
 #include "build/spatial_split.h"
 #include "build/split.h"
 
@@ -80,9 +81,11 @@ Hierarchy build_bvh_spatial(MeshView mesh, ScratchVector<Reference> references,
     NodeBounds root;
     parallel.run([&] { root = measure(references, parallel); });
     const std::size_t spare = room(references.size(), options);
-    return TopDownBuilder(std::move(references), spare, parallel,
-                          SpatialSahSplit(mesh, root.box.half_area(), options, parallel))
-        .build();
+    Hierarchy out = TopDownBuilder(std::move(references), spare, parallel,
+                                   SpatialSahSplit(mesh, root.box.half_area(), options, parallel))
+                        .build();
+    reinsert_subtrees(out, parallel);
+    return out;
 }
 
 }  // namespace packet

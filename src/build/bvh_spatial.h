@@ -1,4 +1,5 @@
 // Bounding volume hierarchy with spatial splits: where children would overlap, triangles are cut.
+// Large subtrees then move (reinsertion.h).
 #pragma once
 
 #include "build/hierarchy.h"
