@@ -115,7 +115,7 @@ int main(int argc, char** argv) {
     app.add_option("--triangles", options.triangles, "of each scene")
         ->delimiter(',')
         ->check(CLI::Range(std::size_t{1}, packet::tools::kMaxTriangles));
-    app.add_option("--rays", options.rays, "random, diffuse or ao")->delimiter(',');
+    app.add_option("--rays", options.rays, "kinds of rays, as in random,ao")->delimiter(',');
     app.add_option("--threads", options.threads)->delimiter(',')->check(CLI::Range(1, 4096));
     app.add_option("--side", options.side, "its square is the number of rays")
         ->check(CLI::Range(1, 10000))
