@@ -3,7 +3,6 @@
 #include "share.h"
 
 #include "build/reinsertion.h"
-#include "build/tree.h"
 #include "core/views.h"
 
 #include <doctest/doctest.h>
@@ -81,7 +80,7 @@ struct Measures {
     int depth = 0;
 };
 
-/// Checks that boxes are those of the children and that leaves hold the `count` boxes once each.
+/// Checks that nodes' boxes are those of their children, and that leaves hold each box once.
 Measures measure(const Hierarchy& hierarchy, const std::vector<Bounds3f>& boxes) {
     Measures out;
     std::vector<int> times(boxes.size());
