@@ -21,7 +21,7 @@ namespace {
 
 // Overlap that is worth a try, as a share of the root's area and of the node's own: smooth surfaces
 // have too little nearly everywhere, and build sooner. Measured:
-// docs/benchmarking.md#quality-of-hierarchies.
+// docs/experiments.md#quality-of-hierarchies.
 constexpr float kLeastOfRoot = 3e-5f;
 constexpr float kLeastOfNode = 0.05f;
 

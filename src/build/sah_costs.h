@@ -13,7 +13,7 @@
 namespace packet {
 
 /// Single triangles that cost as much as a block, if a node of two children costs as one.
-/// docs/benchmarking.md#quality-of-hierarchies
+/// docs/experiments.md#quality-of-hierarchies
 inline constexpr float kBlockTests = 2.0f;
 
 struct SahCosts {

@@ -11,7 +11,7 @@ namespace packet {
 namespace {
 
 // Expected cost of a wide node, and of a block of triangles. Half of the blocks are met for nothing
-// and left early: docs/benchmarking.md#quality-of-hierarchies
+// and left early: docs/experiments.md#quality-of-hierarchies
 constexpr float kNodeCost = 1.0f;
 constexpr float kBlockCost = 1.0f;
 // Nodes of a task, about, in balanced trees: 100 us of work.

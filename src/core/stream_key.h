@@ -4,7 +4,7 @@
 
 namespace packet {
 
-/// Cells along each side. Finer ones make no better streams: docs/benchmarking.md#streams.
+/// Cells along each side. Finer ones make no better streams: docs/experiments.md#streams.
 inline constexpr int kOriginCellBits = 4, kOriginCells = 1 << kOriginCellBits;
 
 /// Classes are in the order of direction_class(), an octant's four apart.

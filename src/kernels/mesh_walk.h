@@ -54,7 +54,7 @@ private:
     }
 
     struct Alone {
-        // Measured: docs/benchmarking.md#packets.
+        // Measured: docs/experiments.md#packets.
         static constexpr int kFewest = N / 4;
         MeshWalk& walk;
         PACKET_NOINLINE void operator()(const WideChild& child, Mask<N, Isa> active) const {

@@ -23,7 +23,7 @@ PACKET_INLINE void load_stream(Stream<Isa>& out, const TreeView& tree, std::int3
 }
 
 /// Streams that take steps in turn: what one of them fetches arrives while the others walk.
-/// Measured: docs/benchmarking.md#streams.
+/// Measured: docs/experiments.md#streams.
 inline constexpr int kStreamsInTurn = 8;
 
 template <Query query, class Isa, class Stats>

@@ -106,7 +106,7 @@ private:
     static constexpr int N = kPacketLanes<Isa>;
     using Lanes = Float<N, Isa>;
 
-    // Fewer rays are not worth asking the beam. Measured: docs/benchmarking.md#streams.
+    // Fewer rays are not worth asking the beam. Measured: docs/experiments.md#streams.
     static constexpr int kFewestForBoxes = kStreamRays / 2 + 1;
     static constexpr int kFewestForTriangles = kStreamRays / 4 + 1;
 

@@ -82,7 +82,7 @@ public:
 
 private:
     // As few lanes of one packet go on as single rays, whose box tests are exact for each child.
-    // Measured: docs/benchmarking.md#beside-embree.
+    // Measured: docs/experiments.md#tiles-and-single-rays.
     static constexpr int kFewest = 3;
 
     [[nodiscard]] PACKET_INLINE bool is_lone(std::uint32_t packets) const {

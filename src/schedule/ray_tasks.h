@@ -14,7 +14,7 @@
 
 namespace packet {
 
-// Fewer, of 24 classes, make streams of few rays: docs/benchmarking.md#streams.
+// Fewer, of 24 classes, make streams of few rays: docs/experiments.md#streams.
 inline constexpr std::size_t kLeastRaysForStreams = 1024;
 
 /// Rays of a task of streams. The more are sorted together, the more come together at a node; but
