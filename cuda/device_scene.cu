@@ -43,7 +43,7 @@ public:
         : scene_(scene), rays_(rays), options_(options), query_(query) {
         piece_ = std::min(piece_size(options.width), rays.size());
         if (options_.mode != DeviceMode::kAuto) return;
-        const bool coheres = choose_mode(rays, scene.scene.bounds()) == Mode::kTile;
+        const bool coheres = are_coherent(rays, scene.scene.bounds());
         options_.mode = coheres ? DeviceMode::kWarp : DeviceMode::kThread;
     }
 

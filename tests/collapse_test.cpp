@@ -6,7 +6,9 @@
 
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <cstring>
+#include <limits>
 
 using namespace packet;
 
@@ -38,6 +40,47 @@ TEST_CASE("wide leaves that fit into a block do not straddle two") {
                 CHECK(first / kBlockSize == (first + items - 1) / kBlockSize);
             });
         }
+    }
+}
+
+TEST_CASE("the spacing of leaves follows from their boxes") {
+    for (const tools::SceneKind& kind : tools::kSceneKinds) {
+        for (const std::size_t count : {1u, 300u, 30000u}) {
+            CAPTURE(kind.name);
+            CAPTURE(count);
+            const TriangleMesh mesh = kind.make(count, 1);
+            const Tree tree = build_tree(mesh.view(), {});
+            double area = 0.0, side = 0.0;
+            for (const WideNode& node : tree.wide_nodes) {
+                for (int i = 0; i < kWideSize; ++i) {
+                    if (!(node.plane[0][0][i] <= node.plane[1][0][i])) continue;
+                    if (!node.child[i].is_leaf()) continue;
+                    Bounds3f box;
+                    for (int a = 0; a < 3; ++a) {
+                        box.lower[a] = node.plane[0][a][i];
+                        box.upper[a] = node.plane[1][a][i];
+                    }
+                    area += static_cast<double>(box.half_area());
+                    side += std::sqrt(static_cast<double>(box.half_area()));
+                }
+            }
+            const double of_all = static_cast<double>(tree.bounds.half_area());
+            CHECK(tree.leaf_spacing == doctest::Approx(std::sqrt(area * of_all) / side));
+        }
+    }
+}
+
+TEST_CASE("leaves of finer meshes are closer together, also by threads") {
+    BuildOptions options;
+    float last = std::numeric_limits<float>::infinity();
+    for (const std::size_t count : {300u, 3000u, 30000u}) {
+        const TriangleMesh mesh = tools::make_terrain(count, 1);
+        options.threads = 1;
+        const float spacing = build_tree(mesh.view(), options).leaf_spacing;
+        CHECK(spacing < last / 2);
+        options.threads = 8;
+        CHECK(build_tree(mesh.view(), options).leaf_spacing == spacing);
+        last = spacing;
     }
 }
 

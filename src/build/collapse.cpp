@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <limits>
 
 namespace packet {
@@ -72,9 +73,31 @@ struct Hanging {
     int child;
 };
 
+/// Sums over leaves of half the areas of their boxes, and of the roots of these.
+struct LeafSizes {
+    double area = 0.0, side = 0.0;
+
+    void add(const Bounds3f& box) {
+        const double half_area = static_cast<double>(box.half_area());
+        area += half_area;
+        side += std::sqrt(half_area);
+    }
+    void add(const LeafSizes& other) {
+        area += other.area;
+        side += other.side;
+    }
+    /// As Tree::leaf_spacing: the mean side of leaves, by area, is area / side, and of those in
+    /// `world` a random ray meets area / (half the area of that).
+    [[nodiscard]] float spacing(const Bounds3f& world) const {
+        if (side == 0.0) return std::numeric_limits<float>::infinity();  // too small for floats
+        return static_cast<float>(std::sqrt(area * static_cast<double>(world.half_area())) / side);
+    }
+};
+
 struct Plan {
     std::vector<PlannedNode> nodes;
     std::vector<std::uint32_t> id_of_item;
+    LeafSizes leaf_sizes;
     std::size_t first_node = 0, first_block = 0;
 
     [[nodiscard]] std::size_t block_count() const { return id_of_item.size() / kBlockSize; }
@@ -111,6 +134,7 @@ private:
             const std::uint32_t child = node.children.id[i];
             if (cuts_.is_leaf(child)) {
                 out_.nodes[index].link[i] = place(child);
+                out_.leaf_sizes.add(nodes_[child].bounds);
             } else if (cuts_.item_count(child) <= hang_at_) {
                 hanging_->push_back({index, child, i});
             } else {
@@ -230,6 +254,7 @@ WideTree collapse(const Hierarchy& hierarchy, const WideCuts& cuts, Items items,
         parallel.advance(part_of_task);
     });
     std::size_t node_count = 0, block_count = 0;
+    LeafSizes leaf_sizes;
     for (std::size_t i = 0; i < plans.size(); ++i) {
         plans[i].first_node = node_count;
         plans[i].first_block = block_count;
@@ -239,8 +264,10 @@ WideTree collapse(const Hierarchy& hierarchy, const WideCuts& cuts, Items items,
         }
         node_count += plans[i].nodes.size();
         block_count += plans[i].block_count();
+        leaf_sizes.add(plans[i].leaf_sizes);
     }
     WideTree out;
+    out.leaf_spacing = leaf_sizes.spacing(hierarchy.nodes[0].bounds);
     out.nodes.resize(node_count);
     out.blocks.resize(block_count);
     const Writer writer(hierarchy, cuts, mesh, place_leaf, out);

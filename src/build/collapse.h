@@ -18,6 +18,7 @@ enum class Items : std::uint8_t { kTriangles, kIds };
 struct WideTree {
     ScratchVector<WideNode> nodes;
     ScratchVector<TriangleBlock> blocks;
+    float leaf_spacing = 0.0f;  ///< as Tree::leaf_spacing
 };
 
 /// Nodes are in depth-first order but for those near the root, which come first. Leaves that fit

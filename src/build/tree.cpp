@@ -69,6 +69,7 @@ Tree lay_out(const Hierarchy& hierarchy, Items items, MeshView mesh, const Build
     });
     tree.wide_nodes = std::move(wide.nodes);
     tree.blocks = std::move(wide.blocks);
+    tree.leaf_spacing = wide.leaf_spacing;
     if (options.keep_binary_nodes) {
         tree.nodes = linearize(hierarchy, tree.stats.node_count, first_item, parallel);
     }

@@ -8,6 +8,7 @@
 
 #include <packet/accel.h>
 
+#include <limits>
 #include <vector>
 
 namespace packet {
@@ -29,6 +30,9 @@ struct Tree {
     Grid grid;  ///< empty but for grids
     Bounds3f bounds;
     BuildStats stats;
+    /// How far apart, about, rays meet different leaves: the side of the leaves that a random ray
+    /// meets, in the mean, divided by the root of how many these are. Infinite for grids.
+    float leaf_spacing = std::numeric_limits<float>::infinity();
 
     [[nodiscard]] TreeView view() const noexcept;
     [[nodiscard]] std::size_t byte_count() const noexcept;

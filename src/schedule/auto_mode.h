@@ -1,20 +1,21 @@
-// Picks a mode by looking at the rays.
+// Tells what rays are like from a sample of at most 64 runs of 8 neighbours.
 #pragma once
 
-#include <packet/isa.h>
-#include <packet/scene.h>
+#include <packet/bounds.h>
 #include <packet/trace.h>
 
+#include <limits>
 #include <span>
 
 namespace packet {
 
-/// The mode that suits the rays, judged from a sample of at most 64 runs of 8 neighbours: tiles if
-/// most runs start close together and go the same way, single rays else. O(1).
-[[nodiscard]] Mode choose_mode(std::span<const Ray> rays, const Bounds3f& world);
+/// Whether neighbours start close together and go the same way in half of the sample or more; and
+/// are `farthest` apart, at most, where they hit something. How far that is nobody knows yet: from
+/// where they enter `world` on a part of its diagonal. O(1).
+[[nodiscard]] bool are_coherent(std::span<const Ray> rays, const Bounds3f& world,
+                                float farthest = std::numeric_limits<float>::infinity());
 
-/// Whether neighbours start anywhere, judged from as many: only rays that come later, if any,
-/// start near them. O(1).
+/// Whether neighbours start anywhere: only rays that come later, if any, start near them. O(1).
 [[nodiscard]] bool are_scattered(std::span<const Ray> rays, const Bounds3f& world);
 
 }  // namespace packet

@@ -5,6 +5,8 @@
 #include "schedule/stream_order.h"
 #include "schedule/treelet_sweep.h"
 
+#include <limits>
+
 namespace packet {
 
 namespace {
@@ -12,7 +14,7 @@ namespace {
 // Fewer fill not much more than one task does.
 constexpr std::size_t kLeastRaysTogether = 8 * StreamOrder::kMostRays;
 // Rays that meet less than this have not enough of the way in common to pay for being read and
-// written in an order that is far from theirs. Measured: docs/benchmarking.md#streams.
+// written in an order that is far from theirs. Measured: docs/experiments.md#streams.
 constexpr double kLeastCostTogether = 28.0;
 
 KernelTable::Kernel kernel_of(Mode mode) {
@@ -39,6 +41,17 @@ bool has_treelets(const SceneView& scene) {
 
 TracePlan plan_treelets() { return {.kernel = KernelTable::kStream, .by_treelets = true}; }
 
+/// Whether neighbours cohere, and mostly meet the same leaves; where there are no streams to give
+/// other rays to, it is enough that they cohere.
+bool fit_tiles(const SceneAccel& scene, std::span<const Ray> rays) {
+    constexpr float kLeaves = 5.0f;  // measured: docs/experiments.md#tiles-or-streams
+    float farthest = std::numeric_limits<float>::infinity();
+    if (has_one_tree(scene.view)) {
+        farthest = kLeaves * scene.trees[scene.mesh_of_instance[0]].leaf_spacing;
+    }
+    return are_coherent(rays, scene.top.bounds, farthest);
+}
+
 /// Whether neighbours do not start near each other, and are many.
 bool are_many_and_scattered(const SceneAccel& scene, std::span<const Ray> rays) {
     return rays.size() >= kLeastRaysTogether && are_scattered(rays, scene.top.bounds);
@@ -51,15 +64,10 @@ TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
     return {KernelTable::kStream, together ? Sorting::kTogether : Sorting::kByTask};
 }
 
-/// Closest-hit, or any-hit of rays in the order in which they are to be traced. Packets are tried
-/// but where there is so little of a tree to a ray that rays of a tile meet the same: there tiles
-/// are faster, and tries only cost. Measured: docs/benchmarking.md#beside-embree.
-TracePlan plan_tiles(const SceneAccel& scene, std::span<const Ray> rays) {
-    constexpr std::size_t kLeastBytesPerRay = 500;
-    const bool may_lose =
-        !has_one_tree(scene.view) ||
-        scene.view.instances[0].tree->byte_count / kLeastBytesPerRay >= rays.size();
-    return {.kernel = KernelTable::kTile, .packets_below = may_lose ? 0.9 : 0.0};
+/// Closest-hit, or any-hit of rays in the order in which they are to be traced. Where there
+/// are no streams to take rays for which tiles are slow, packets are tried.
+TracePlan plan_tiles(const SceneAccel& scene) {
+    return {.kernel = KernelTable::kTile, .packets_below = has_one_tree(scene.view) ? 0.0 : 0.9};
 }
 
 /// Whether so many rays are worth sorting, and may be traced by streams.
@@ -77,21 +85,19 @@ TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode
             return {KernelTable::kSingle};
         case Mode::kTile:
             // Rays that do not cohere fit no beam, and tiles would be packets, the slowest of all.
-            if (may_stream(scene, rays) && choose_mode(rays, scene.top.bounds) != Mode::kTile) {
+            if (may_stream(scene, rays) && !fit_tiles(scene, rays)) {
                 return plan_streams(scene, rays);
             }
-            return plan_tiles(scene, rays);
+            return plan_tiles(scene);
         default: return {kernel_of(mode)};
     }
 }
 
-/// As the rays and the query suggest: docs/benchmarking.md#beside-embree.
+/// As the rays and the query suggest: docs/experiments.md#tiles-and-single-rays.
 TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
                         int threads) {
-    const bool is_coherent = choose_mode(rays, scene.top.bounds) == Mode::kTile;
-    if (is_coherent) {
-        if (!may_stream(scene, rays) || query == TraceQuery::kClosest)
-            return plan_tiles(scene, rays);
+    if (fit_tiles(scene, rays)) {
+        if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles(scene);
         return {KernelTable::kStream, Sorting::kByTask};
     }
     // Rays that start near each other meet the same nodes by streams already, and any-hit rays are

@@ -28,7 +28,7 @@ struct TracePlan {
     bool by_treelets = false;  ///< by kernels of their own
 };
 
-/// `Mode::kAuto` looks at a sample of the rays: docs/benchmarking.md#beside-embree. O(1).
+/// `Mode::kAuto` looks at a sample of the rays: docs/experiments.md#tiles-and-single-rays. O(1).
 [[nodiscard]] TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays,
                                   TraceQuery query, Mode mode, int threads);
 

@@ -1,0 +1,119 @@
+// By what kernel rays are traced, by what they look like and by what there is to hit.
+#include "schedule/trace_plan.h"
+#include "random.h"
+#include "test_rays.h"
+
+#include <doctest/doctest.h>
+
+#include <limits>
+#include <utility>
+
+using namespace packet;
+using namespace packet::test;
+
+namespace {
+
+constexpr std::size_t kMany = 4096;
+
+Scene scene_of(TriangleMesh mesh, AccelKind accel = AccelKind::kBvh, int instances = 1) {
+    Scene scene;
+    const std::uint32_t id = scene.add_mesh(std::move(mesh));
+    for (int i = 0; i < instances; ++i) scene.add_instance(id, glm::mat4x3(1.0f));
+    BuildOptions options;
+    options.accel = accel;
+    scene.commit(options);
+    return scene;
+}
+
+/// In the unit square of the plane z = 0, of 2 n^2 triangles.
+Scene square_of(int n, AccelKind accel = AccelKind::kBvh, int instances = 1) {
+    const float side = 1.0f / static_cast<float>(n);
+    return scene_of(make_grid(n, n, glm::vec3(0), {side, 0, 0}, {0, side, 0}), accel, instances);
+}
+
+/// Downwards from `height` above the middle of the square: from origins up to `apart` from each
+/// other along each axis, and with slopes that differ by as much as `angle`.
+std::vector<Ray> rays_down(float height, float apart, float angle, std::size_t count = kMany) {
+    tools::Random random(1);
+    std::vector<Ray> rays(count);
+    for (Ray& ray : rays) {
+        ray.org = glm::vec3(0.5f, 0.5f, height) + apart * (random.point() - 0.5f);
+        ray.dir =
+            glm::vec3(angle * (random.uniform() - 0.5f), angle * (random.uniform() - 0.5f), -1.0f);
+    }
+    return rays;
+}
+
+TracePlan plan(const Scene& scene, std::span<const Ray> rays,
+               TraceQuery query = TraceQuery::kClosest, Mode mode = Mode::kAuto) {
+    return make_plan(scene.accel(), rays, query, mode, 1);
+}
+
+}  // namespace
+
+TEST_CASE("rays that cohere go by tiles where leaves are large, and by streams where small") {
+    const Scene coarse = square_of(8), fine = square_of(256);
+    struct Case {
+        float height, apart, angle;
+        bool tiles_if_coarse, tiles_if_fine;
+    };
+    for (const Case& c : {Case{0.1f, 0.0f, 0.0f, true, true},        //
+                          Case{0.1f, 0.001f, 0.0f, true, true},      //
+                          Case{0.1f, 0.04f, 0.0f, true, false},      // over four leaves of the fine
+                          Case{0.1f, 0.3f, 0.0f, false, false},      // start apart
+                          Case{0.1f, 0.0f, 0.01f, true, true},       //
+                          Case{0.3f, 0.0f, 0.15f, true, false},      //
+                          Case{0.1f, 0.0f, 0.8f, false, false},      // go apart
+                          Case{10.0f, 0.0f, 0.01f, true, false}}) {  // come apart on the way
+        CAPTURE(c.height);
+        CAPTURE(c.apart);
+        CAPTURE(c.angle);
+        const std::vector<Ray> rays = rays_down(c.height, c.apart, c.angle);
+        for (const Mode mode : {Mode::kAuto, Mode::kTile}) {
+            CAPTURE(to_string(mode));
+            const auto expected = [](bool tiles) {
+                return tiles ? KernelTable::kTile : KernelTable::kStream;
+            };
+            CHECK(plan(coarse, rays, TraceQuery::kClosest, mode).kernel ==
+                  expected(c.tiles_if_coarse));
+            CHECK(plan(fine, rays, TraceQuery::kClosest, mode).kernel == expected(c.tiles_if_fine));
+        }
+    }
+}
+
+TEST_CASE("any-hit rays go by streams, sorted by task, whether they cohere or not") {
+    const Scene scene = square_of(8);
+    for (const float apart : {0.0f, 0.04f, 1.0f}) {
+        CAPTURE(apart);
+        const TracePlan of = plan(scene, rays_down(0.1f, apart, 0.0f), TraceQuery::kAny);
+        CHECK(of.kernel == KernelTable::kStream);
+        CHECK(of.sorting == Sorting::kByTask);
+    }
+}
+
+TEST_CASE("where there are no streams rays that cohere go by tiles, and packets are tried") {
+    const std::vector<Ray> rays = rays_down(0.1f, 0.04f, 0.0f), apart = rays_down(0.1f, 1.0f, 0.0f);
+    for (const Scene& scene : {square_of(64, AccelKind::kGrid), square_of(64, AccelKind::kBvh, 2),
+                               square_of(64, AccelKind::kGridOfTrees)}) {
+        CHECK(plan(scene, rays).kernel == KernelTable::kTile);
+        CHECK(plan(scene, rays).packets_below > 0.0);
+        CHECK(plan(scene, apart).kernel == KernelTable::kSingle);
+        CHECK(plan(scene, apart).packets_below > 0.0);
+    }
+}
+
+TEST_CASE("few rays are not worth sorting") {
+    const Scene fine = square_of(256);
+    CHECK(plan(fine, rays_down(0.1f, 0.0f, 0.0f, 64)).kernel == KernelTable::kTile);
+    CHECK(plan(fine, rays_down(0.1f, 0.3f, 0.0f, 64)).kernel == KernelTable::kSingle);
+    CHECK(plan(fine, rays_down(0.1f, 0.0f, 0.0f, 7)).kernel == KernelTable::kSingle);
+    CHECK(plan(fine, {}).kernel == KernelTable::kSingle);
+}
+
+TEST_CASE("rays of no numbers do not cohere") {
+    std::vector<Ray> rays = rays_down(0.1f, 0.0f, 0.0f);
+    for (Ray& ray : rays) ray.dir.x = std::numeric_limits<float>::quiet_NaN();
+    CHECK(plan(square_of(8), rays).kernel == KernelTable::kStream);
+    for (Ray& ray : rays) ray.dir = glm::vec3(0.0f);
+    CHECK(plan(square_of(8), rays).kernel == KernelTable::kStream);
+}
