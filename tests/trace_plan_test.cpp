@@ -46,7 +46,9 @@ std::vector<Ray> rays_down(float height, float apart, float angle, std::size_t c
 
 TracePlan plan(const Scene& scene, std::span<const Ray> rays,
                TraceQuery query = TraceQuery::kClosest, Mode mode = Mode::kAuto) {
-    return make_plan(scene.accel(), rays, query, mode, 1);
+    TraceOptions options;
+    options.mode = mode;
+    return make_plan(scene.accel(), rays, query, options, 1);
 }
 
 }  // namespace
@@ -78,6 +80,34 @@ TEST_CASE("rays that cohere go by tiles where leaves are large, and by streams w
                   expected(c.tiles_if_coarse));
             CHECK(plan(fine, rays, TraceQuery::kClosest, mode).kernel == expected(c.tiles_if_fine));
         }
+    }
+}
+
+TEST_CASE("rays of an image are near each other if they are known to be an image's") {
+    constexpr int kSide = 64;
+    std::vector<Ray> rays;
+    for (int i = 0; i < kSide * kSide; ++i) {
+        const auto column = static_cast<float>(i % kSide), row = static_cast<float>(i / kSide);
+        Ray ray;
+        ray.org = glm::vec3(0.5f, 0.5f, 1.0f);
+        ray.dir = glm::vec3(column / kSide - 0.5f, row / kSide - 0.5f, -3.0f);
+        rays.push_back(ray);
+    }
+    const Scene coarse = square_of(8), middling = square_of(64), fine = square_of(512);
+    for (const Mode mode : {Mode::kAuto, Mode::kTile}) {
+        CAPTURE(to_string(mode));
+        TraceOptions of_image, of_rays;
+        of_image.mode = of_rays.mode = mode;
+        of_image.width = kSide;
+        const auto kernel = [&](const Scene& scene, const TraceOptions& options) {
+            return make_plan(scene.accel(), rays, TraceQuery::kClosest, options, 1).kernel;
+        };
+        CHECK(kernel(coarse, of_image) == KernelTable::kTile);
+        CHECK(kernel(coarse, of_rays) == KernelTable::kTile);
+        CHECK(kernel(middling, of_image) == KernelTable::kTile);
+        CHECK(kernel(middling, of_rays) == KernelTable::kStream);
+        CHECK(kernel(fine, of_image) == KernelTable::kStream);
+        CHECK(kernel(fine, of_rays) == KernelTable::kStream);
     }
 }
 

@@ -39,7 +39,7 @@ public:
           options_(options),
           rays_(rays),
           parallel_(options.threads, progress),
-          plan_(make_plan(scene_, rays, query, options.mode, parallel_.threads())),
+          plan_(make_plan(scene_, rays, query, options, parallel_.threads())),
           tasks_(plan_.sorting != Sorting::kNone
                      ? RayTasks::sorted(rays, parallel_.threads(), find_keys_)
                      : RayTasks(rays, options.width)),

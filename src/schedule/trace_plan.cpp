@@ -5,8 +5,6 @@
 #include "schedule/stream_order.h"
 #include "schedule/treelet_sweep.h"
 
-#include <limits>
-
 namespace packet {
 
 namespace {
@@ -41,15 +39,13 @@ bool has_treelets(const SceneView& scene) {
 
 TracePlan plan_treelets() { return {.kernel = KernelTable::kStream, .by_treelets = true}; }
 
-/// Whether neighbours cohere, and mostly meet the same leaves; where there are no streams to give
-/// other rays to, it is enough that they cohere.
-bool fit_tiles(const SceneAccel& scene, std::span<const Ray> rays) {
-    constexpr float kLeaves = 5.0f;  // measured: docs/experiments.md#tiles-or-streams
-    float farthest = std::numeric_limits<float>::infinity();
-    if (has_one_tree(scene.view)) {
-        farthest = kLeaves * scene.trees[scene.mesh_of_instance[0]].leaf_spacing;
-    }
-    return are_coherent(rays, scene.top.bounds, farthest);
+/// Whether tiles suit the rays: where there are no streams for those that do not share leaves, it
+/// is enough that they cohere.
+bool fit_tiles(const SceneAccel& scene, std::span<const Ray> rays, int width) {
+    const Bounds3f& world = scene.top.bounds;
+    if (!are_coherent(rays, world)) return false;
+    return !has_one_tree(scene.view) ||
+           share_leaves(rays, width, world, scene.trees[scene.mesh_of_instance[0]].leaf_spacing);
 }
 
 /// Whether neighbours do not start near each other, and are many.
@@ -75,7 +71,7 @@ bool may_stream(const SceneAccel& scene, std::span<const Ray> rays) {
     return rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
 }
 
-TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode) {
+TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode, int width) {
     switch (mode) {
         case Mode::kTreelet:
             if (has_treelets(scene.view)) return plan_treelets();
@@ -85,7 +81,7 @@ TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode
             return {KernelTable::kSingle};
         case Mode::kTile:
             // Rays that do not cohere fit no beam, and tiles would be packets, the slowest of all.
-            if (may_stream(scene, rays) && !fit_tiles(scene, rays)) {
+            if (may_stream(scene, rays) && !fit_tiles(scene, rays, width)) {
                 return plan_streams(scene, rays);
             }
             return plan_tiles(scene);
@@ -95,8 +91,8 @@ TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode
 
 /// As the rays and the query suggest: docs/experiments.md#tiles-and-single-rays.
 TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
-                        int threads) {
-    if (fit_tiles(scene, rays)) {
+                        int width, int threads) {
+    if (fit_tiles(scene, rays, width)) {
         if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles(scene);
         return {KernelTable::kStream, Sorting::kByTask};
     }
@@ -114,10 +110,10 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
 
 }  // namespace
 
-TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query, Mode mode,
-                    int threads) {
-    return mode == Mode::kAuto ? plan_by_looks(scene, rays, query, threads)
-                               : plan_as_asked(scene, rays, mode);
+TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
+                    const TraceOptions& options, int threads) {
+    return options.mode == Mode::kAuto ? plan_by_looks(scene, rays, query, options.width, threads)
+                                       : plan_as_asked(scene, rays, options.mode, options.width);
 }
 
 }  // namespace packet

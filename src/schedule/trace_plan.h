@@ -28,8 +28,9 @@ struct TracePlan {
     bool by_treelets = false;  ///< by kernels of their own
 };
 
-/// `Mode::kAuto` looks at a sample of the rays: docs/experiments.md#tiles-and-single-rays. O(1).
+/// By the mode and the width of `options`, and `threads` of their own. `Mode::kAuto` looks at a
+/// sample of the rays: docs/experiments.md#tiles-and-single-rays. O(1).
 [[nodiscard]] TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays,
-                                  TraceQuery query, Mode mode, int threads);
+                                  TraceQuery query, const TraceOptions& options, int threads);
 
 }  // namespace packet
