@@ -22,7 +22,7 @@ constexpr float kHitDistance = 0.15f;
 // From ray to ray of the eight that are looked at of a tile, in the mean; of an image, whose tiles
 // are blocks of pixels, from one pixel to the next in a row. Where tiles and streams are equally
 // fast: docs/experiments.md#tiles-or-streams.
-constexpr float kLeavesPerStep = 3.2f;
+constexpr float kLeavesPerStep = 2.8f;
 constexpr float kLeavesPerPixel = 0.7f;
 
 bool start_together(Run run, float diagonal) {
