@@ -86,12 +86,14 @@ TEST_CASE("rays that cohere go by tiles where leaves are large, and by streams w
 TEST_CASE("rays of an image are near each other if they are known to be an image's") {
     constexpr int kSide = 64;
     std::vector<Ray> rays;
-    for (int i = 0; i < kSide * kSide; ++i) {
-        const auto column = static_cast<float>(i % kSide), row = static_cast<float>(i / kSide);
-        Ray ray;
-        ray.org = glm::vec3(0.5f, 0.5f, 1.0f);
-        ray.dir = glm::vec3(column / kSide - 0.5f, row / kSide - 0.5f, -3.0f);
-        rays.push_back(ray);
+    for (int row = 0; row < kSide; ++row) {
+        for (int column = 0; column < kSide; ++column) {
+            const glm::vec3 place = glm::vec3(column, row, 0) / static_cast<float>(kSide);
+            Ray ray;
+            ray.org = glm::vec3(0.5f, 0.5f, 1.0f);
+            ray.dir = place - glm::vec3(0.5f, 0.5f, 3.0f);
+            rays.push_back(ray);
+        }
     }
     const Scene coarse = square_of(8), middling = square_of(64), fine = square_of(512);
     for (const Mode mode : {Mode::kAuto, Mode::kTile}) {

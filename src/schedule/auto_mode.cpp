@@ -50,10 +50,11 @@ float mean_step(Run run, std::size_t stride, const Bounds3f& world) {
     const float t = distance_to_hit(run[0].org, world);
     const auto at_hit = [&](const Ray& ray) { return ray.org + t * glm::normalize(ray.dir); };
     float sum = 0.0f;
-    for (std::size_t i = stride; i < run.size(); i += stride) {
+    int steps = 0;
+    for (std::size_t i = stride; i < run.size(); i += stride, ++steps) {
         sum += glm::distance(at_hit(run[i]), at_hit(run[i - stride]));
     }
-    return sum / static_cast<float>((run.size() - 1) / stride);
+    return sum / static_cast<float>(steps);
 }
 
 /// Whether test(run) holds for half of a sample of runs of `length` neighbours or more. NaN
