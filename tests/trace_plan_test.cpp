@@ -137,6 +137,7 @@ TEST_CASE("where there are no streams rays that cohere go by tiles, and packets 
 TEST_CASE("few rays are not worth sorting") {
     const Scene fine = square_of(256);
     CHECK(plan(fine, rays_down(0.1f, 0.0f, 0.0f, 64)).kernel == KernelTable::kTile);
+    CHECK(plan(fine, rays_down(0.1f, 0.04f, 0.0f, 512)).kernel == KernelTable::kTile);
     CHECK(plan(fine, rays_down(0.1f, 0.3f, 0.0f, 64)).kernel == KernelTable::kSingle);
     CHECK(plan(fine, rays_down(0.1f, 0.0f, 0.0f, 7)).kernel == KernelTable::kSingle);
     CHECK(plan(fine, {}).kernel == KernelTable::kSingle);

@@ -39,15 +39,6 @@ bool has_treelets(const SceneView& scene) {
 
 TracePlan plan_treelets() { return {.kernel = KernelTable::kStream, .by_treelets = true}; }
 
-/// Whether tiles suit the rays: where there are no streams for those that do not share leaves, it
-/// is enough that they cohere.
-bool fit_tiles(const SceneAccel& scene, std::span<const Ray> rays, int width) {
-    const Bounds3f& world = scene.top.bounds;
-    if (!are_coherent(rays, world)) return false;
-    return !has_one_tree(scene.view) ||
-           share_leaves(rays, width, world, scene.trees[scene.mesh_of_instance[0]].leaf_spacing);
-}
-
 /// Whether neighbours do not start near each other, and are many.
 bool are_many_and_scattered(const SceneAccel& scene, std::span<const Ray> rays) {
     return rays.size() >= kLeastRaysTogether && are_scattered(rays, scene.top.bounds);
@@ -69,6 +60,15 @@ TracePlan plan_tiles(const SceneAccel& scene) {
 /// Whether so many rays are worth sorting, and may be traced by streams.
 bool may_stream(const SceneAccel& scene, std::span<const Ray> rays) {
     return rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
+}
+
+/// Whether tiles suit the rays: where there are no streams for those that do not share leaves, it
+/// is enough that they cohere.
+bool fit_tiles(const SceneAccel& scene, std::span<const Ray> rays, int width) {
+    const Bounds3f& world = scene.top.bounds;
+    if (!are_coherent(rays, world)) return false;
+    return !may_stream(scene, rays) ||
+           share_leaves(rays, width, world, scene.trees[scene.mesh_of_instance[0]].leaf_spacing);
 }
 
 TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode, int width) {
