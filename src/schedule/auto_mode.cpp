@@ -18,7 +18,7 @@ constexpr float kLeastCosine = 0.98f;
 // Of the scene's diagonal: farther apart rays start in different places, and rays that start in the
 // scene hit something about so far away.
 constexpr float kFarthestOrigin = 0.05f;
-constexpr float kHitDistance = 0.15f;
+constexpr float kHitDistance = 0.12f;
 // From ray to ray of the eight that are looked at of a tile, in the mean; of an image, whose tiles
 // are blocks of pixels, from one pixel to the next in a row. Where tiles and streams are equally
 // fast: docs/experiments.md#tiles-or-streams.
