@@ -73,7 +73,7 @@ TEST_CASE("tiles of rays that do not cohere") {
 }
 
 TEST_CASE("tiles whose rays are farther apart than triangles are large") {
-    constexpr int kSide = 32;
+    constexpr int kSide = 31;  // more rays than this square would go by streams
     for (const tools::SceneKind& kind : tools::kSceneKinds) {
         CAPTURE(kind.name);
         Scene scene = make_scene(kind.make(40000, 5));

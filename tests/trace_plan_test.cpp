@@ -1,5 +1,6 @@
 // By what kernel rays are traced, by what they look like and by what there is to hit.
 #include "schedule/trace_plan.h"
+#include "oracle.h"
 #include "random.h"
 #include "test_rays.h"
 
@@ -110,6 +111,19 @@ TEST_CASE("rays of an image are near each other if they are known to be an image
         CHECK(kernel(middling, of_rays) == KernelTable::kStream);
         CHECK(kernel(fine, of_image) == KernelTable::kStream);
         CHECK(kernel(fine, of_rays) == KernelTable::kStream);
+    }
+}
+
+TEST_CASE("whether they share leaves or not, rays hit what the oracle says") {
+    const Scene fine = square_of(256);
+    for (const auto& [apart, kernel] : {std::pair(0.001f, KernelTable::kTile),  //
+                                        std::pair(0.04f, KernelTable::kStream)}) {
+        CAPTURE(apart);
+        const std::vector<Ray> rays = rays_down(0.1f, apart, 0.01f, 1024);
+        REQUIRE(plan(fine, rays).kernel == kernel);
+        std::vector<Hit> got(rays.size());
+        trace_closest(fine, rays, got);
+        CHECK(got == Oracle(fine).closest(rays));
     }
 }
 

@@ -47,7 +47,7 @@ enum class TreeletCut : std::uint8_t {
     kSubtrees  ///< subtrees as large as allowed, then what is above them in the same way
 };
 
-/// A size of treelets that serves `Mode::kTreelet` well: docs/benchmarking.md#treelets.
+/// A size of treelets that serves `Mode::kTreelet` well: docs/experiments.md#treelets.
 inline constexpr std::size_t kUsualTreeletBytes = std::size_t{1} << 20;
 /// Trees of so many bytes, which is more than the last level of most caches holds, may be cut into
 /// treelets if nothing else is asked for.

@@ -15,7 +15,7 @@
 namespace packet {
 
 /// Rays through trees of a lower SAH cost meet so few nodes that streams take less time than
-/// waiting at treelets does: docs/benchmarking.md#treelets.
+/// waiting at treelets does: docs/experiments.md#treelets.
 inline constexpr double kLeastCostToCut = 128.0;
 
 /// Cuts the tree into treelets by `options`, and lays its wide nodes out treelet by treelet, each

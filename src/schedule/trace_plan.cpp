@@ -80,7 +80,7 @@ TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode
             if (has_one_tree(scene.view)) return plan_streams(scene, rays);
             return {KernelTable::kSingle};
         case Mode::kTile:
-            // Rays that do not cohere fit no beam, and tiles would be packets, the slowest of all.
+            // Others fit no beam or share no leaves: tiles would be packets, the slowest of all.
             if (may_stream(scene, rays) && !fit_tiles(scene, rays, width)) {
                 return plan_streams(scene, rays);
             }

@@ -29,7 +29,7 @@ void fetch_lines(const T* object) {
 }  // namespace
 
 std::size_t rays_per_sweep(std::size_t rays, std::size_t tree_bytes, int threads) noexcept {
-    constexpr std::size_t kBytesPerRay = 1000;  // measured: docs/benchmarking.md#treelets
+    constexpr std::size_t kBytesPerRay = 1000;  // measured: docs/experiments.md#treelets
     constexpr std::size_t kLeast = 65536;
     const std::size_t wanted = std::max(tree_bytes / kBytesPerRay, kLeast);
     const auto thread_count = static_cast<std::size_t>(threads);
@@ -41,7 +41,7 @@ std::size_t rays_per_sweep(std::size_t rays, std::size_t tree_bytes, int threads
 
 bool sweeps_beat_streams(std::size_t rays, std::size_t tree_bytes, double sah_cost,
                          int threads) noexcept {
-    constexpr std::size_t kMostBytesPerRay = 2000;  // measured: docs/benchmarking.md#treelets
+    constexpr std::size_t kMostBytesPerRay = 2000;  // measured: docs/experiments.md#treelets
     const std::size_t together = std::min(rays, kMostSortedTogether);
     return tree_bytes >= kLeastBytesToCut && sah_cost >= kLeastCostToCut &&
            tree_bytes <= kMostBytesPerRay * rays_per_sweep(together, tree_bytes, threads);

@@ -4,7 +4,7 @@
 // A ray waits at all treelets that it enters below the one it has gone through, by 8 bytes each,
 // and those that lie behind what it has hit by their turn are left out. Pharr and others send a ray
 // to one treelet at a time, the nearest, and go on where most rays wait: nothing is met in vain
-// then, but each treelet is fetched five to ten times (docs/benchmarking.md#treelets).
+// then, but each treelet is fetched five to ten times (docs/experiments.md#treelets).
 //
 // Pharr, Kolb, Gershbein, Hanrahan. Rendering complex scenes with memory-coherent ray tracing.
 // SIGGRAPH 1997. Aila, Karras. Architecture considerations for tracing incoherent rays.
