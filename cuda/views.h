@@ -70,7 +70,6 @@ PACKET_DEVICE void prepare_lane(PreparedLane& out, const TreeView& tree, const L
     for (int a = 0; a < 3; ++a) {
         out.shear.axis[a] = a;
         out.shear.org[a] = ray.org[a];
-        out.near_side[a] = 0;
     }
 }
 

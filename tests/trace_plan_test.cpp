@@ -126,6 +126,37 @@ TEST_CASE("whether they share leaves or not, rays hit what the oracle says") {
     }
 }
 
+TEST_CASE("where an image's tiles go into several octants, rays hit what the oracle says") {
+    // The octants' borders lie within blocks of 16 x 8, of whole tiles and of those at the edge.
+    constexpr int kWidth = 72, kHeight = 64;
+    const Scene scene = square_of(12);
+    for (const glm::vec3 middle :
+         {glm::vec3(27.3f, 29.7f, 80.0f), glm::vec3(69.2f, 12.6f, 80.0f)}) {
+        std::vector<Ray> rays;
+        for (int row = 0; row < kHeight; ++row) {
+            for (int column = 0; column < kWidth; ++column) {
+                Ray ray;
+                ray.org = glm::vec3(0.43f, 0.57f, 0.3f);
+                ray.dir = (glm::vec3(column, row, 0) - middle) / 80.0f;
+                rays.push_back(ray);
+            }
+        }
+        const std::vector<Hit> want = Oracle(scene).closest(rays);
+        TraceOptions options;
+        options.width = kWidth;
+        REQUIRE(make_plan(scene.accel(), rays, TraceQuery::kClosest, options, 1).kernel ==
+                KernelTable::kTile);
+        for (const IsaId isa : built_isas()) {
+            if (!cpu_supports(isa)) continue;
+            CAPTURE(to_string(isa));
+            options.isa = isa;
+            std::vector<Hit> got(rays.size());
+            trace_closest(scene, rays, got, options);
+            CHECK(got == want);
+        }
+    }
+}
+
 TEST_CASE("any-hit rays go by streams, sorted by task, whether they cohere or not") {
     const Scene scene = square_of(8);
     for (const float apart : {0.0f, 0.04f, 1.0f}) {

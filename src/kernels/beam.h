@@ -42,15 +42,35 @@ struct BeamBounds {
     }
 };
 
-/// The lower and upper bound of active lanes.
+/// The lanes of a packet that count: those that are active, or all.
+template <int N, class Isa>
+struct ActiveLanes {
+    Mask<N, Isa> active;
+
+    PACKET_INLINE Float<N, Isa> choose(const Float<N, Isa>& value,
+                                       const Float<N, Isa>& other) const {
+        return select(active, value, other);
+    }
+    PACKET_INLINE Mask<N, Isa> fail(Mask<N, Isa> condition) const { return active & ~condition; }
+};
+template <int N, class Isa>
+struct AllLanes {
+    PACKET_INLINE Float<N, Isa> choose(const Float<N, Isa>& value, const Float<N, Isa>&) const {
+        return value;
+    }
+    PACKET_INLINE Mask<N, Isa> fail(Mask<N, Isa> condition) const { return ~condition; }
+};
+
+/// The lower and upper bound of the lanes that count.
 template <int N, class Isa>
 struct LaneBounds {
     using F = Float<N, Isa>;
     F lower = __builtin_huge_valf(), upper = -__builtin_huge_valf();
 
-    PACKET_INLINE void extend(Mask<N, Isa> active, const F& value) {
-        lower = min(lower, select(active, value, F(__builtin_huge_valf())));
-        upper = max(upper, select(active, value, F(-__builtin_huge_valf())));
+    template <class Lanes>
+    PACKET_INLINE void extend(const Lanes& lanes, const F& value) {
+        lower = min(lower, lanes.choose(value, __builtin_huge_valf()));
+        upper = max(upper, lanes.choose(value, -__builtin_huge_valf()));
     }
 };
 
@@ -94,27 +114,43 @@ public:
         : rays_(rays), best_(best), packet_count_(packet_count) {}
 
     PACKET_INLINE BeamBounds build() {
+        F least = best_[0].t;
+        for (int p = 1; p < packet_count_; ++p) least = min(least, best_[p].t);
+        if (none(~(least > F(kNever)))) [[likely]]
+            return bound([](int) { return AllLanes<N, Isa>(); });
+        return bound([&](int p) { return ActiveLanes<N, Isa>{is_active(p)}; });
+    }
+
+private:
+    static constexpr float kFarthest = 1e30f;
+
+    PACKET_INLINE M is_active(int packet) const { return best_[packet].t > F(kNever); }
+
+    /// The lanes lanes_of(p) of packet p count.
+    template <class LanesOf>
+    PACKET_INLINE BeamBounds bound(LanesOf&& lanes_of) const {
         BeamBounds out;
         for (int a = 0; a < 3; ++a) out.axis[a] = rays_[0].shear.axis[a];
         out.near_side = rays_[0].near_side[out.axis[2]];
         const float sign = out.near_side == 0 ? 1.0f : -1.0f;
         LaneBounds<N, Isa> slope[2], begin, end;
         F first(__builtin_huge_valf()), margin(0.0f);
-        M looks_ahead = M::from_bits(~0u), starts_there = looks_ahead;
+        M looks_back = M::from_bits(0), starts_elsewhere = looks_back;
         find_start(out.origin);
         for (int p = 0; p < packet_count_; ++p) {
             const PreparedRays<N, Isa>& ray = rays_[p];
-            const M active = is_active(p);
-            slope[0].extend(active, ray.shear.shear_x);
-            slope[1].extend(active, ray.shear.shear_y);
+            const auto lanes = lanes_of(p);
+            slope[0].extend(lanes, ray.shear.shear_x);
+            slope[1].extend(lanes, ray.shear.shear_y);
             const F z = ray.shear.org[2] * F(sign);
-            first = min(first, select(active, z, first));
-            looks_ahead = looks_ahead & (~active | (ray.hit.tnear >= F(0.0f)));
-            begin.extend(active, z + ray.hit.tnear * ray.speed);
-            end.extend(active, z + best_[p].t * ray.speed);
+            first = min(first, lanes.choose(z, first));
+            looks_back = looks_back | lanes.fail(ray.hit.tnear >= F(0.0f));
+            begin.extend(lanes, z + ray.hit.tnear * ray.speed);
+            end.extend(lanes, z + best_[p].t * ray.speed);
             for (int a = 0; a < 3; ++a) {
-                margin = max(margin, select(active, ray.hit.org[0][a] - ray.hit.org[1][a], margin));
-                starts_there = starts_there & (~active | (ray.shear.org[a] == F(out.origin[a])));
+                margin = max(margin, lanes.choose(ray.hit.org[0][a] - ray.hit.org[1][a], margin));
+                starts_elsewhere =
+                    starts_elsewhere | lanes.fail(ray.shear.org[a] == F(out.origin[a]));
             }
         }
         const F zero(0.0f);
@@ -127,16 +163,11 @@ public:
         // The difference of the grown origins is twice the growth, which bounds a hit's rounding.
         out.margin = -4.0f * least[3];
         const float lowest[2] = {least[4], least[5]}, highest[2] = {-least[6], -least[7]};
-        out.has_origin = none(~starts_there);
-        anchor(out, lowest, highest, least[0] * sign, sign);
-        out.is_sound = none(~looks_ahead) && extent(out) < kFarthest;  // false for NaN
+        out.has_origin = none(starts_elsewhere);
+        anchor(out, lowest, highest, least[0] * sign, sign, lanes_of);
+        out.is_sound = none(looks_back) && extent(out) < kFarthest;  // false for NaN
         return out;
     }
-
-private:
-    static constexpr float kFarthest = 1e30f;
-
-    PACKET_INLINE M is_active(int packet) const { return best_[packet].t > F(kNever); }
 
     /// Where the first active ray starts, or one of the first packet's if that has none.
     PACKET_INLINE void find_start(float (&out)[3]) const {
@@ -153,15 +184,17 @@ private:
         PACKET_INLINE float spread() const { return upper[0] - lower[0] + (upper[1] - lower[1]); }
     };
     /// Where the rays cross two planes of z.
-    PACKET_INLINE void cross(const float (&plane)[2], Crossing (&out)[2]) const {
+    template <class LanesOf>
+    PACKET_INLINE void cross(const float (&plane)[2], Crossing (&out)[2],
+                             LanesOf&& lanes_of) const {
         LaneBounds<N, Isa> bounds[2][2];
         for (int p = 0; p < packet_count_; ++p) {
             const ShearRays<N, Isa>& shear = rays_[p].shear;
-            const M active = is_active(p);
+            const auto lanes = lanes_of(p);
             for (int i = 0; i < 2; ++i) {
                 const F way = F(plane[i]) - shear.org[2];
-                bounds[i][0].extend(active, shear.org[0] + shear.shear_x * way);
-                bounds[i][1].extend(active, shear.org[1] + shear.shear_y * way);
+                bounds[i][0].extend(lanes, shear.org[0] + shear.shear_x * way);
+                bounds[i][1].extend(lanes, shear.org[1] + shear.shear_y * way);
             }
         }
         F values[8];
@@ -181,8 +214,9 @@ private:
     /// start where the rays are closest, unless that is so far away that rounding there exceeds the
     /// margin. After the anchor it is the ray of least slope that is lowest, before it that of
     /// greatest.
+    template <class LanesOf>
     PACKET_INLINE void anchor(BeamBounds& out, const float (&lowest)[2], const float (&highest)[2],
-                              float begin, float sign) const {
+                              float begin, float sign, LanesOf&& lanes_of) const {
         // The margin is 64 ulp of the scene's reach at least, and a line's rounding 8 ulp of its
         // way to the anchor and 6 of the reach: the way may be 4 times as long as the reach.
         constexpr float kUlps = 16.0f / 16777216.0f;
@@ -193,7 +227,7 @@ private:
         if (out.has_origin) {
             for (int a = 0; a < 2; ++a) at[0].lower[a] = at[0].upper[a] = out.origin[a];
         } else {
-            cross(plane, at);
+            cross(plane, at, lanes_of);
             is_after = !(has_end && at[1].spread() < at[0].spread());
         }
         const Crossing& crossing = at[is_after ? 0 : 1];

@@ -13,8 +13,8 @@
 
 namespace packet {
 
-/// A run of rays to trace. Ray i is rays[order ? order[i] : i], and its result goes to the same
-/// place.
+/// A run of rays to trace. Ray i is rays[order ? order[i / row] + i % row : i], where a row is
+/// 2^row_bits rays that follow each other, and its result goes to the same place.
 struct TraceBatch {
     const SceneView* scene;
     const Ray* rays;
@@ -23,6 +23,7 @@ struct TraceBatch {
     Hit* hits;               ///< closest-hit kernels write these
     std::uint8_t* occluded;  ///< any-hit kernels write these
     TraceStats* stats;       ///< counted into by the counting kernels, else null
+    int row_bits = 0;        ///< of no account without an order
 };
 
 /// A ray that waits at a treelet, unless (closest-hit) it has hit something before `enter` by then.

@@ -56,9 +56,10 @@ struct PreparedRays {
     /// For nodes, by the quick form: t = plane * inv_dir - shift. kShared: [0] for the planes that
     /// are met first, [1] for the others; else for the lower and the upper planes.
     F inv_dir[3], shift[2][3];
-    int near_side[3];  ///< kShared: per axis, the plane of a box that is met first
+    int near_side[3];  ///< kShared: per axis, the plane of a box that is met first; else 0
     Directions directions;
-    F speed;  ///< along the longest axis, for a unit of t
+    bool is_steep;  ///< some lane's quick form may take other reciprocals than the contract's
+    F speed;        ///< along the longest axis, for a unit of t
     ShearRays<N, Isa> shear;
     HitRays<N, Isa> hit;
 };
@@ -102,13 +103,16 @@ template <int N, class Isa>
 PACKET_INLINE Mask<N, Isa> usable(const RayLanes<N, Isa>& ray) {
     using F = Float<N, Isa>;
     constexpr float kSmallestNormal = 1.175494351e-38f;
-    Mask<N, Isa> ok = ray.tnear <= ray.tfar;
+    const F zero(0.0f);
+    // NaN where a number is not finite, as 0 times it is; else 0, fused or not
+    F nothing(0.0f);
     for (int a = 0; a < 3; ++a) {
-        ok = ok & (abs(ray.org[a]) <= F(kLargestFloat)) & (abs(ray.dir[a]) <= F(kLargestFloat));
+        nothing = multiply_subtract(ray.org[a], zero, nothing);
+        nothing = multiply_subtract(ray.dir[a], zero, nothing);
     }
-    // max(x, NaN) is NaN, but a NaN direction has been ruled out above
+    // max(x, NaN) is NaN, but a NaN direction is ruled out
     const F longest = max(abs(ray.dir[0]), max(abs(ray.dir[1]), abs(ray.dir[2])));
-    return ok & (longest >= F(kSmallestNormal));
+    return (ray.tnear <= ray.tfar) & (nothing == zero) & (longest >= F(kSmallestNormal));
 }
 
 /// object = M * world, rounded in this order on every ISA.
@@ -134,8 +138,7 @@ PACKET_INLINE Float<N, Isa> box_growth(const TreeView& tree, const RayLanes<N, I
     using F = Float<N, Isa>;
     F reach(0.0f);
     for (int a = 0; a < 3; ++a) {
-        reach = max(reach, abs(F(tree.lower[a]) - ray.org[a]));
-        reach = max(reach, abs(F(tree.upper[a]) - ray.org[a]));
+        reach = max(reach, max(ray.org[a] - F(tree.lower[a]), F(tree.upper[a]) - ray.org[a]));
     }
     return (reach + F(tree.reach)) * F(tree.slack);
 }
@@ -146,22 +149,32 @@ PACKET_INLINE Float<N, Isa> node_growth(const Float<N, Isa>& growth, const Float
     return growth + growth + abs(org) * Float<N, Isa>(4.0f * kOriginSlack);
 }
 
-/// The quick form takes boxes as grown by 8 ulp of the reach and 3 of the origin more than the
-/// contract's form, so that it rejects no box in which that finds a triangle's. It bounds
-/// reciprocals by 2^32 times that of the longest axis; what drift this neglects is less than the
-/// growth. Where a product overflows still, the planes of that axis hold nothing back. See
-/// docs/decisions/box-slack.md.
+/// Of an axis, by sides of boxes; kept in the order in which these are met.
 template <int N, class Isa>
-PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray,
-                                 const Float<N, Isa>& growth) {
+PACKET_INLINE void set_shifts(PreparedRays<N, Isa>& out, int a, const Float<N, Isa>& lower,
+                              const Float<N, Isa>& upper) {
+    // Not indexed by the side: a tile's packets all go one way.
+    if (out.near_side[a] == 0) {
+        out.shift[0][a] = lower;
+        out.shift[1][a] = upper;
+    } else {
+        out.shift[0][a] = upper;
+        out.shift[1][a] = lower;
+    }
+}
+
+/// As prepare_nodes(), where some of the rays are steep, all but parallel to an axis. It bounds
+/// reciprocals by 2^32 times that of the longest axis; what drift this neglects is less than the
+/// growth. Where a product overflows still, the planes of that axis hold nothing back.
+template <int N, class Isa>
+PACKET_NOINLINE_ON_CPU void prepare_steep_nodes(PreparedRays<N, Isa>& out,
+                                                const RayLanes<N, Isa>& ray,
+                                                const Float<N, Isa>& growth,
+                                                const Float<N, Isa>& limit) {
     using F = Float<N, Isa>;
-    constexpr float kSteepest = 0x1p32f;
     constexpr float kInfinity = __builtin_huge_valf();
-    const F(&reciprocal)[3] = out.hit.reciprocal;
-    const F least = min(abs(reciprocal[0]), min(abs(reciprocal[1]), abs(reciprocal[2])));
-    const F limit = min(F(kLargestFloat), least * F(kSteepest));
     for (int a = 0; a < 3; ++a) {
-        const F inv_dir = max(F(0.0f) - limit, min(limit, reciprocal[a]));
+        const F inv_dir = max(F(0.0f) - limit, min(limit, out.hit.reciprocal[a]));
         const F more = node_growth(growth, ray.org[a]);
         const F lower = (ray.org[a] + more) * inv_dir, upper = (ray.org[a] - more) * inv_dir;
         // if (|lower| > largest || |upper| > largest) 0 * plane - shift is -inf or inf, which
@@ -169,8 +182,36 @@ PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Is
         const Mask<N, Isa> fits = max(abs(lower), abs(upper)) <= F(kLargestFloat);
         const F open = select(inv_dir < F(0.0f), F(-kInfinity), F(kInfinity));
         out.inv_dir[a] = select(fits, inv_dir, F(0.0f));
-        out.shift[0][a] = select(fits, lower, open);
-        out.shift[1][a] = select(fits, upper, F(0.0f) - open);
+        set_shifts(out, a, select(fits, lower, open), select(fits, upper, F(0.0f) - open));
+    }
+}
+
+/// The quick form takes boxes as grown by 8 ulp of the reach and 3 of the origin more than the
+/// contract's form, so that it rejects no box in which that finds a triangle's. See
+/// docs/decisions/box-slack.md.
+template <int N, class Isa>
+PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray,
+                                 const Float<N, Isa>& growth) {
+    using F = Float<N, Isa>;
+    constexpr float kSteepest = 0x1p32f;
+    F least, most, farthest, more[3];
+    for (int a = 0; a < 3; ++a) {
+        const F size = abs(out.hit.reciprocal[a]), distance = abs(ray.org[a]);
+        more[a] = node_growth(growth, ray.org[a]);
+        least = a == 0 ? size : min(least, size);
+        most = a == 0 ? size : max(most, size);
+        farthest = a == 0 ? distance + more[a] : max(farthest, distance + more[a]);
+    }
+    const F limit = min(F(kLargestFloat), least * F(kSteepest));
+    // false for NaN, as lanes have it that take no part
+    const Mask<N, Isa> is_plain = (most <= limit) & (farthest * most <= F(kLargestFloat));
+    out.is_steep = any(~is_plain);
+    if (out.is_steep) [[unlikely]]
+        return prepare_steep_nodes(out, ray, growth, limit);
+    for (int a = 0; a < 3; ++a) {
+        const F& inv_dir = out.hit.reciprocal[a];
+        out.inv_dir[a] = inv_dir;
+        set_shifts(out, a, (ray.org[a] + more[a]) * inv_dir, (ray.org[a] - more[a]) * inv_dir);
     }
 }
 
@@ -185,6 +226,17 @@ struct ExitOrigins {
 
     PACKET_INLINE ExitOrigins(const PreparedRays<N, Isa>& from, const TreeView& tree,
                               const RayLanes<N, Isa>& ray) {
+        for (int a = 0; a < 3; ++a) {
+            org[0][a] = from.hit.org[0][a];
+            org[1][a] = from.hit.org[1][a];
+        }
+        if (from.is_steep) [[unlikely]]
+            correct(from, tree, ray);
+    }
+
+private:
+    PACKET_NOINLINE void correct(const PreparedRays<N, Isa>& from, const TreeView& tree,
+                                 const RayLanes<N, Isa>& ray) {
         const F infinity(__builtin_huge_valf()), growth = box_growth(tree, ray);
         for (int a = 0; a < 3; ++a) {
             const F more = node_growth(growth, ray.org[a]);
@@ -198,48 +250,60 @@ struct ExitOrigins {
     }
 };
 
+/// For boxes by the contract's form; returns by how much they are grown.
 template <int N, class Isa>
-PACKET_INLINE void prepare_boxes(PreparedRays<N, Isa>& out, const TreeView& tree,
-                                 const RayLanes<N, Isa>& ray) {
+PACKET_INLINE Float<N, Isa> prepare_hits(HitRays<N, Isa>& out, const TreeView& tree,
+                                         const RayLanes<N, Isa>& ray) {
     using F = Float<N, Isa>;
     const F e = box_growth(tree, ray);
     for (int a = 0; a < 3; ++a) {
         // Far from the world's origin org + e would round back to org: a further ulp of org stays.
         const F growth = e + abs(ray.org[a]) * F(kOriginSlack);
-        out.hit.org[0][a] = ray.org[a] + growth;
-        out.hit.org[1][a] = ray.org[a] - growth;
-        out.hit.reciprocal[a] = safe_reciprocal(ray.dir[a]);
+        out.org[0][a] = ray.org[a] + growth;
+        out.org[1][a] = ray.org[a] - growth;
+        out.reciprocal[a] = safe_reciprocal(ray.dir[a]);
     }
-    prepare_nodes(out, ray, e);
-    out.hit.tnear = ray.tnear;
+    out.tnear = ray.tnear;
+    return e;
 }
 
-/// Notes whether the active lanes share octant and longest axis, and if so, which; then puts shifts
-/// into the order in which planes are met.
+/// For boxes in either form, of lanes that may go anywhere.
+template <int N, class Isa>
+PACKET_INLINE void prepare_boxes(PreparedRays<N, Isa>& out, const TreeView& tree,
+                                 const RayLanes<N, Isa>& ray) {
+    for (int& side : out.near_side) side = 0;
+    prepare_nodes(out, ray, prepare_hits(out.hit, tree, ray));
+}
+
+template <int N, class Isa>
+PACKET_INLINE void find_longest_axis(ShearRays<N, Isa>& out, const RayLanes<N, Isa>& ray) {
+    const auto x = abs(ray.dir[0]), y = abs(ray.dir[1]), z = abs(ray.dir[2]);
+    out.z_is_x = (x >= y) & (x >= z);
+    out.z_is_y = ~out.z_is_x & (y >= z);
+}
+
+/// Notes whether the active lanes share octant and longest axis, and if so, which.
 template <int N, class Isa>
 PACKET_INLINE void prepare_directions(PreparedRays<N, Isa>& out, std::uint32_t active) {
-    out.directions = Directions::kShared;
-    const std::uint32_t x = out.shear.z_is_x.bits() & active;
-    const std::uint32_t y = out.shear.z_is_y.bits() & active;
-    const int z_axis = x != 0 ? 0 : y != 0 ? 1 : 2;
-    if ((x != 0 && x != active) || (y != 0 && y != active)) out.directions = Directions::kMixed;
+    std::uint32_t differ = 0;
+    const auto any_of = [&](Mask<N, Isa> lanes) {
+        const std::uint32_t bits = lanes.bits() & active;
+        differ |= bits != 0 ? bits ^ active : 0;
+        return bits != 0;
+    };
+    constexpr int kAxes[3][3] = {{1, 2, 0}, {2, 0, 1}, {0, 1, 2}};
+    const bool is_x = any_of(out.shear.z_is_x), is_y = any_of(out.shear.z_is_y);
+    int z = is_x ? 0 : is_y ? 1 : 2;
     for (int a = 0; a < 3; ++a) {
-        const std::uint32_t negative =
-            (out.hit.reciprocal[a] < Float<N, Isa>(0.0f)).bits() & active;
-        if (negative != 0 && negative != active) out.directions = Directions::kMixed;
-        out.near_side[a] = negative != 0 ? 1 : 0;
+        out.near_side[a] = any_of(out.hit.reciprocal[a] < Float<N, Isa>(0.0f)) ? 1 : 0;
     }
-    for (int a = 0; a < 3 && out.directions == Directions::kShared; ++a) {
-        if (out.near_side[a] == 0) continue;
-        const Float<N, Isa> lower = out.shift[0][a];
-        out.shift[0][a] = out.shift[1][a];
-        out.shift[1][a] = lower;
+    out.directions = Directions::kShared;
+    if (differ != 0) [[unlikely]] {
+        out.directions = Directions::kMixed;
+        for (int& side : out.near_side) side = 0;
+        z = 2;
     }
-    constexpr int kNext[3] = {1, 2, 0};
-    const int z = out.directions == Directions::kShared ? z_axis : 2;
-    out.shear.axis[0] = kNext[z];
-    out.shear.axis[1] = kNext[kNext[z]];
-    out.shear.axis[2] = z;
+    for (int i = 0; i < 3; ++i) out.shear.axis[i] = kAxes[z][i];
 }
 
 /// Per lane: longest axis to z, the two after it in cyclic order to x and y.
@@ -251,33 +315,39 @@ PACKET_INLINE Float3<N, Isa> rotate_axes(const ShearRays<N, Isa>& ray,
             select(ray.z_is_x, p[0], select(ray.z_is_y, p[1], p[2]))};
 }
 
-/// After prepare_boxes().
+/// `dir` and the reciprocal with the longest axis as z.
+template <int N, class Isa>
+PACKET_INLINE void set_shear(PreparedRays<N, Isa>& out, const Float3<N, Isa>& dir,
+                             const Float<N, Isa>& reciprocal_z) {
+    out.shear.shear_x = dir.x / dir.z;
+    out.shear.shear_y = dir.y / dir.z;
+    out.speed = abs(dir.z);
+    out.hit.scale_z = reciprocal_z;  // 1 / dir.z: the longest axis is long enough
+}
+
+/// After prepare_hits(), of lanes that may go anywhere.
 template <int N, class Isa>
 PACKET_INLINE void prepare_shear(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray) {
-    ShearRays<N, Isa>& shear = out.shear;
-    const auto x = abs(ray.dir[0]), y = abs(ray.dir[1]), z = abs(ray.dir[2]);
-    shear.z_is_x = (x >= y) & (x >= z);
-    shear.z_is_y = ~shear.z_is_x & (y >= z);
-    const Float3<N, Isa> d = rotate_axes(shear, ray.dir);
-    shear.shear_x = d.x / d.z;
-    shear.shear_y = d.y / d.z;
-    out.speed = abs(d.z);
-    // 1 / d.z: the longest axis is long enough.
-    out.hit.scale_z = rotate_axes(shear, out.hit.reciprocal).z;
+    find_longest_axis(out.shear, ray);
+    set_shear(out, rotate_axes(out.shear, ray.dir), rotate_axes(out.shear, out.hit.reciprocal).z);
 }
 
 /// All of it for a packet, whose `active` lanes are usable.
 template <int N, class Isa>
 PACKET_INLINE void prepare(PreparedRays<N, Isa>& out, const TreeView& tree,
                            const RayLanes<N, Isa>& ray, std::uint32_t active) {
-    prepare_boxes(out, tree, ray);
-    prepare_shear(out, ray);
+    const Float<N, Isa> growth = prepare_hits(out.hit, tree, ray);
+    find_longest_axis(out.shear, ray);
     prepare_directions(out, active);
-    for (int a = 0; a < 3; ++a) {
-        // Read by a constant index in each arm: a computed one would put the lanes into memory.
-        const int from = out.shear.axis[a];
-        out.shear.org[a] = from == 0 ? ray.org[0] : from == 1 ? ray.org[1] : ray.org[2];
+    prepare_nodes(out, ray, growth);
+    const int(&axis)[3] = out.shear.axis;
+    if (out.directions == Directions::kShared) [[likely]] {
+        set_shear(out, Float3<N, Isa>{ray.dir[axis[0]], ray.dir[axis[1]], ray.dir[axis[2]]},
+                  out.hit.reciprocal[axis[2]]);
+    } else {
+        prepare_shear(out, ray);
     }
+    for (int i = 0; i < 3; ++i) out.shear.org[i] = ray.org[axis[i]];
 }
 
 }  // namespace packet

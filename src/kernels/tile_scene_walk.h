@@ -1,5 +1,5 @@
-// Traces a tile: its rays are walked in beams as large as their directions allow, halved until they
-// do; what fits into none goes packet by packet.
+// Traces a tile: its rays, whose directions are shared, are walked in beams as large as these
+// allow, halved until they do; what fits into none goes packet by packet.
 #pragma once
 
 #include "kernels/scene_walk.h"
@@ -11,6 +11,18 @@ namespace packet {
 /// Packets whose beam would be wider than this part of its way through the tree walk in two beams.
 /// Measured: from 0.1 to 1 the speeds differ by less than their noise.
 inline constexpr float kWidestBeam = 0.25f;
+
+/// Whether the rays of both packets go into the same octant with the same longest axis.
+template <int N, class Isa>
+PACKET_INLINE bool share_directions(const PreparedRays<N, Isa>& one,
+                                    const PreparedRays<N, Isa>& other) {
+    if (other.directions == Directions::kMixed || one.shear.axis[2] != other.shear.axis[2])
+        return false;
+    for (int a = 0; a < 3; ++a) {
+        if (one.near_side[a] != other.near_side[a]) return false;
+    }
+    return true;
+}
 
 /// The packets of a tile in a mesh.
 template <Query query, int N, class Isa, class Stats, class Alone>
@@ -37,19 +49,7 @@ struct TileTracer {
     }
 
 private:
-    [[nodiscard]] bool share_directions(int first, int last) const {
-        for (int p = first; p < last; ++p) {
-            if ((active >> p & 1u) == 0) continue;
-            if (rays[p].directions == Directions::kMixed) return false;
-            for (int a = 0; a < 3; ++a) {
-                if (rays[p].near_side[a] != rays[first].near_side[a]) return false;
-            }
-            if (rays[p].shear.axis[2] != rays[first].shear.axis[2]) return false;
-        }
-        return true;
-    }
     bool walk_beam(int first, int last) {
-        if (!share_directions(first, last)) return false;
         const BeamBounds bounds = bound_rays(rays + first, best + first, last - first);
         const int z = bounds.axis[2];
         const float way = tree.upper[z] - tree.lower[z];

@@ -3,49 +3,30 @@
 
 #include "kernels/counters.h"
 #include "kernels/direction_class.h"
-#include "kernels/kernel_table.h"
+#include "kernels/ray_columns.h"
 #include "kernels/tile_scene_walk.h"
-#include "kernels/transpose.h"
 
 namespace packet {
 
-/// Rays transposed: one array a component, in the order of Ray's members. (RayPacket itself has
-/// constructors, and a copy of those compiled for this ISA must not end up in the library.)
-template <int kCount, class Isa>
-struct RayArrays {
-    alignas(64) float component[8][kCount];
-};
+/// All lanes of N.
+template <int N>
+inline constexpr std::uint32_t kAllLanes = static_cast<std::uint32_t>((std::uint64_t{1} << N) - 1);
 
-/// Where the components of rays lie.
-struct RayColumns {
-    const float* component[8];
-
-    PACKET_INLINE RayColumns from(int lane) const {
-        RayColumns out;
-        for (int i = 0; i < 8; ++i) out.component[i] = component[i] + lane;
-        return out;
-    }
-};
-
-/// Hits transposed. A miss has t = inf and ids of -1.
-template <int kCount, class Isa>
-struct HitArrays {
-    alignas(64) float t[kCount];
-    float u[kCount], v[kCount];
-    std::int32_t prim_id[kCount], instance_id[kCount];
-};
-
-/// Loads the lanes of `active`; the others become NaN, which takes part in nothing.
+/// Loads the lanes that are asked for; the others become NaN, which takes part in nothing.
 template <int N, class Isa>
-PACKET_INLINE RayLanes<N, Isa> load_rays(const RayColumns& rays, Mask<N, Isa> active) {
+PACKET_INLINE RayLanes<N, Isa> load_rays(const RayColumns& rays, std::uint32_t asked) {
     using F = Float<N, Isa>;
+    const auto rays_of = [&](auto&& lanes_of) -> RayLanes<N, Isa> {
+        return {{lanes_of(0), lanes_of(1), lanes_of(2)},
+                {lanes_of(4), lanes_of(5), lanes_of(6)},
+                max(F(-kLargestFloat), lanes_of(3)),  // NaN stays NaN
+                lanes_of(7)};
+    };
+    if (asked == kAllLanes<N>) [[likely]]
+        return rays_of([&](int i) { return F::load(rays.component[i]); });
+    const auto active = Mask<N, Isa>::from_bits(asked);
     const F nan(__builtin_nanf(""));
-    F lanes[8];
-    for (int i = 0; i < 8; ++i) lanes[i] = select(active, F::load(rays.component[i]), nan);
-    return {{lanes[0], lanes[1], lanes[2]},
-            {lanes[4], lanes[5], lanes[6]},
-            max(F(-kLargestFloat), lanes[3]),  // NaN stays NaN
-            lanes[7]};
+    return rays_of([&](int i) { return select(active, F::load(rays.component[i]), nan); });
 }
 
 template <int N, class Isa, int kCount>
@@ -67,8 +48,7 @@ struct LoadedRays {
     Mask<N, Isa> active;
 
     PACKET_INLINE LoadedRays(const RayColumns& rays, std::uint32_t asked)
-        : ray(load_rays(rays, Mask<N, Isa>::from_bits(asked))),
-          active(Mask<N, Isa>::from_bits(asked) & usable(ray)) {}
+        : ray(load_rays<N, Isa>(rays, asked)), active(usable(ray)) {}
 };
 
 template <Query query, int N, class Isa, int kCount, class Stats>
@@ -98,13 +78,12 @@ PACKET_INLINE void trace_singly(const SceneView& scene, const RayColumns& rays, 
 template <int N>
 PACKET_INLINE std::uint32_t lanes_below(int count, int first) {
     const int lanes = count - first;
-    return lanes <= 0  ? 0u
-           : lanes < N ? (1u << lanes) - 1
-                       : static_cast<std::uint32_t>((std::uint64_t{1} << N) - 1);
+    return lanes <= 0 ? 0u : lanes < N ? (1u << lanes) - 1 : kAllLanes<N>;
 }
 
+/// False, with nothing traced, if the rays do not share their directions.
 template <Query query, int N, class Isa, class Stats>
-PACKET_INLINE void trace_tile(const SceneView& scene, const RayColumns& rays, int count,
+PACKET_INLINE bool trace_tile(const SceneView& scene, const RayColumns& rays, int count,
                               Stats& stats, HitArrays<kTileRays, Isa>& out) {
     const TreeView& tree = *scene.instances[0].tree;
     const auto instance_id = static_cast<std::int32_t>(scene.instances[0].instance_id);
@@ -118,6 +97,7 @@ PACKET_INLINE void trace_tile(const SceneView& scene, const RayColumns& rays, in
         active |= 1u << p;
         best[p].enter_instance(instance_id);
         prepare(prepared[p], tree, loaded.ray, loaded.active.bits());
+        if (!share_directions(prepared[__builtin_ctz(active)], prepared[p])) return false;
     }
     std::uint32_t done = 0;  // the packets whose hits are in `out`
     const auto alone = [&](int p) {
@@ -130,126 +110,7 @@ PACKET_INLINE void trace_tile(const SceneView& scene, const RayColumns& rays, in
     for (int p = 0; p * N < count; ++p) {
         if ((done >> p & 1u) == 0) store_hits(best[p], out, p * N);
     }
-}
-
-/// The mesh is looked up last: an instance's mesh never changes.
-PACKET_INLINE std::uint32_t mesh_of(const SceneView& scene, std::int32_t instance_id) {
-    return instance_id < 0 ? kInvalidId : scene.mesh_of_instance[instance_id];
-}
-
-/// The meshes of eight instances, to be read as one row. Where all are written as one, that need
-/// not wait for them.
-template <class Isa>
-PACKET_INLINE void meshes_of(const SceneView& scene, const std::int32_t* instance_id,
-                             std::int32_t (&out)[8]) {
-    using I = Int<8, Isa>;
-    if (scene.is_single_mesh) {
-        const auto mesh_id =
-            static_cast<std::int32_t>(scene.mesh_of_instance[scene.instances[0].instance_id]);
-        select(I::load(instance_id) < I(0), I(-1), I(mesh_id)).store(out);
-    } else {
-        for (int i = 0; i < 8; ++i)
-            out[i] = static_cast<std::int32_t>(mesh_of(scene, instance_id[i]));
-    }
-}
-
-/// Rays `begin` to `begin + lanes` of the batch, and where their results go.
-PACKET_INLINE std::size_t place(const TraceBatch& batch, std::size_t i) {
-    return batch.order != nullptr ? batch.order[i] : i;
-}
-
-/// Fetches rays `begin` to `begin + count`, as far as there are so many, and the lines of their
-/// hits, while those before them are traced: in a sorted order or an image's no hardware foresees
-/// them.
-PACKET_INLINE void prefetch_rays(const TraceBatch& batch, std::size_t begin, std::size_t count) {
-    const std::size_t end = batch.count - begin < count ? batch.count : begin + count;
-    for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t at = place(batch, i);
-        __builtin_prefetch(batch.rays + at);
-        if (batch.hits != nullptr) __builtin_prefetch(batch.hits + at, 1);
-    }
-}
-
-/// Eight rays become columns: a ray has as many numbers.
-template <int kCount, class Isa>
-PACKET_INLINE void gather_8_rays(const TraceBatch& batch, std::size_t begin,
-                                 RayArrays<kCount, Isa>& out, int first) {
-    static_assert(sizeof(Ray) == 8 * sizeof(float));
-    const float* rows[8];
-    for (std::size_t i = 0; i < 8; ++i) {
-        rows[i] = reinterpret_cast<const float*>(batch.rays + place(batch, begin + i));
-    }
-    Floats8 columns[8];
-    transpose(rows, columns);
-    for (int i = 0; i < 8; ++i) *as_row(out.component[i] + first) = columns[i];
-}
-
-template <int kCount, class Isa>
-PACKET_INLINE RayColumns gather_rays(const TraceBatch& batch, std::size_t begin, int count,
-                                     RayArrays<kCount, Isa>& out) {
-    int i = 0;
-    for (; i + 8 <= count; i += 8) {
-        gather_8_rays(batch, begin + static_cast<std::size_t>(i), out, i);
-    }
-    for (; i < count; ++i) {
-        const Ray& ray = batch.rays[place(batch, begin + static_cast<std::size_t>(i))];
-        out.component[0][i] = ray.org.x, out.component[1][i] = ray.org.y;
-        out.component[2][i] = ray.org.z, out.component[3][i] = ray.tnear;
-        out.component[4][i] = ray.dir.x, out.component[5][i] = ray.dir.y;
-        out.component[6][i] = ray.dir.z, out.component[7][i] = ray.tfar;
-    }
-    RayColumns columns;
-    for (int c = 0; c < 8; ++c) columns.component[c] = out.component[c];
-    return columns;
-}
-
-template <int kCount, class Isa>
-PACKET_INLINE void scatter_hit(const SceneView& scene, const HitArrays<kCount, Isa>& hits, int i,
-                               Hit& out) {
-    out.t = hits.t[i], out.u = hits.u[i], out.v = hits.v[i];
-    out.prim_id = static_cast<std::uint32_t>(hits.prim_id[i]);
-    out.mesh_id = mesh_of(scene, hits.instance_id[i]);
-    out.instance_id = static_cast<std::uint32_t>(hits.instance_id[i]);
-}
-
-/// Eight hits become rows of six numbers.
-template <int kCount, class Isa>
-PACKET_INLINE void scatter_8_hits(const TraceBatch& batch, std::size_t begin,
-                                  const HitArrays<kCount, Isa>& hits, int first) {
-    static_assert(sizeof(Hit) == 6 * sizeof(float));
-    std::int32_t mesh_id[8];
-    meshes_of<Isa>(*batch.scene, hits.instance_id + first, mesh_id);
-    const auto* const instances = reinterpret_cast<const float*>(hits.instance_id + first);
-    const float* const columns[8] = {hits.t + first,
-                                     hits.u + first,
-                                     hits.v + first,
-                                     reinterpret_cast<const float*>(hits.prim_id + first),
-                                     reinterpret_cast<const float*>(mesh_id),
-                                     instances,
-                                     instances,
-                                     instances};  // the last two are not stored
-    Floats8 rows[8];
-    transpose(columns, rows);
-    for (std::size_t i = 0; i < 8; ++i) store6(&batch.hits[place(batch, begin + i)], rows[i]);
-}
-
-template <Query query, int kCount, class Isa>
-PACKET_INLINE void scatter_hits(const TraceBatch& batch, std::size_t begin, int count,
-                                const HitArrays<kCount, Isa>& hits) {
-    int i = 0;
-    if constexpr (query == Query::kClosest) {
-        for (; i + 8 <= count; i += 8) {
-            scatter_8_hits(batch, begin + static_cast<std::size_t>(i), hits, i);
-        }
-    }
-    for (; i < count; ++i) {
-        const std::size_t at = place(batch, begin + static_cast<std::size_t>(i));
-        if constexpr (query == Query::kAny) {
-            batch.occluded[at] = hits.prim_id[i] >= 0;
-        } else {
-            scatter_hit(*batch.scene, hits, i, batch.hits[at]);
-        }
-    }
+    return true;
 }
 
 /// How the rays of a batch are traced: `kCount` at a time, by trace(rays, count, out).
@@ -303,21 +164,24 @@ private:
     PACKET_INLINE void trace_rays(std::size_t begin, int count) {
         const RayColumns columns = gather_rays(batch_, begin, count, rays_);
         prefetch_rays(batch_, begin + static_cast<std::size_t>(count), kTileRays);
-        if (class_run<N, Isa>(columns.component + 4, count) == count) {
-            trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_);
+        if (trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_)) {
             scatter_hits<query>(batch_, begin, count, hits_);
             return;
         }
         const ClassRuns<kTileRays> runs(columns.component + 4, count);
         if (runs.used > kMostClasses) {
-            for (int first = 0; first < count; first += N) {
-                trace_packet<query, N>(*batch_.scene, columns, lanes_below<N>(count, first), stats_,
-                                       hits_, first);
-            }
-            scatter_hits<query>(batch_, begin, count, hits_);
-            return;
+            trace_packets(batch_, begin, columns, count);
+        } else {
+            trace_runs(begin, runs);
         }
-        trace_runs(begin, runs);
+    }
+    PACKET_INLINE void trace_packets(const TraceBatch& batch, std::size_t begin,
+                                     const RayColumns& columns, int count) {
+        for (int first = 0; first < count; first += N) {
+            trace_packet<query, N>(*batch.scene, columns, lanes_below<N>(count, first), stats_,
+                                   hits_, first);
+        }
+        scatter_hits<query>(batch, begin, count, hits_);
     }
 
     /// The rays of each class are a tile.
@@ -331,9 +195,15 @@ private:
             if (count == 0) continue;
             TraceBatch run = batch_;
             run.order = order + runs.begin[c];
+            run.row_bits = 0;
             const RayColumns columns = gather_rays(run, 0, count, rays_);
-            trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_);
-            scatter_hits<query>(run, 0, count, hits_);
+            // Rays of one class share their directions, unless the caller's thread flushes the
+            // reciprocals of huge ones to zero.
+            if (trace_tile<query, N>(*batch_.scene, columns, count, stats_, hits_)) [[likely]] {
+                scatter_hits<query>(run, 0, count, hits_);
+            } else {
+                trace_packets(run, 0, columns, count);
+            }
         }
     }
 

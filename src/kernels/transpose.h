@@ -51,4 +51,31 @@ PACKET_INLINE void transpose(const float* const (&from)[8], Floats8 (&out)[8]) {
     }
 }
 
+/// Stores half of a register's row each.
+PACKET_INLINE void store_halves(void* first, void* second, const Floats8& row) {
+    using Four [[gnu::vector_size(16), gnu::aligned(4), gnu::may_alias]] = float;
+    *static_cast<Four*>(first) = __builtin_shufflevector(row, row, 0, 1, 2, 3);
+    *static_cast<Four*>(second) = __builtin_shufflevector(row, row, 4, 5, 6, 7);
+}
+
+/// Three pairs of numbers of two rows, and of two others in the upper halves, become these rows:
+/// four numbers, four and four.
+PACKET_INLINE void join_pairs(const Floats8 (&pair)[3], Floats8* out) {
+    out[0] = __builtin_shufflevector(pair[0], pair[1], 0, 1, 8, 9, 4, 5, 12, 13);
+    out[1] = __builtin_shufflevector(pair[2], pair[0], 0, 1, 10, 11, 4, 5, 14, 15);
+    out[2] = __builtin_shufflevector(pair[1], pair[2], 2, 3, 10, 11, 6, 7, 14, 15);
+}
+/// Six columns of eight become rows of six that follow each other, four rows and four: what the
+/// lower halves of `out` hold, one after the other, and what the upper ones do.
+PACKET_INLINE void interleave(const float* const (&from)[6], Floats8 (&out)[6]) {
+    Floats8 low[3], high[3];  // pairs of columns, of rows 0, 1, 4, 5 and of 2, 3, 6, 7
+    for (int i = 0; i < 3; ++i) {
+        const Floats8 a = *as_row(from[2 * i]), b = *as_row(from[2 * i + 1]);
+        low[i] = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
+        high[i] = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    join_pairs(low, out);
+    join_pairs(high, out + 3);
+}
+
 }  // namespace packet

@@ -22,29 +22,37 @@ std::size_t PixelOrder::first_ray(std::size_t tile) const noexcept {
 }
 
 /// The even bits of a Morton code.
-static std::size_t even_bits(std::size_t code) noexcept {
+static std::uint32_t even_bits(std::uint32_t code) noexcept {
     return (code & 1) | (code >> 1 & 2) | (code >> 2 & 4);
 }
 
-std::size_t PixelOrder::fill(std::size_t tile, Indices& out) const noexcept {
+bool PixelOrder::is_whole(std::size_t tile) const noexcept {
+    const std::size_t x_end = (tile % tiles_x_ + 1) * kTileSize;
+    const std::size_t last = first_ray(tile) + (kTileSize - 1) * width_ + x_end - 1;
+    return x_end <= width_ && last < count_;
+}
+
+PixelTile PixelOrder::fill(std::size_t tile, Indices& out) const noexcept {
     constexpr std::size_t kSquares = kTileSize / kSquareSize;
     static_assert(kSquares == 8, "three bits a coordinate");
     const std::size_t x_begin = tile % tiles_x_ * kTileSize;
+    if (is_whole(tile)) {
+        const auto line = static_cast<std::uint32_t>(width_);
+        const auto begin = static_cast<std::uint32_t>(x_begin);
+        constexpr std::uint32_t kEdge = kSquareSize;
+        std::uint32_t* row = out.data();
+        for (std::uint32_t square = 0; square < kSquares * kSquares; ++square) {
+            std::uint32_t ray = begin + (even_bits(square >> 1) * line + even_bits(square)) * kEdge;
+            for (std::size_t y = 0; y < kSquareSize; ++y, ray += line) *row++ = ray;
+        }
+        return {kTileSize * kTileSize, kSquareBits};
+    }
     const std::size_t x_end = std::min(x_begin + kTileSize, width_);
     const std::size_t rays_left = count_ - first_ray(tile);
     std::size_t filled = 0;
-    for (std::size_t square = 0; square < kSquares * kSquares; ++square) {
+    for (std::uint32_t square = 0; square < kSquares * kSquares; ++square) {
         const std::size_t x0 = x_begin + even_bits(square) * kSquareSize;
         const std::size_t y0 = even_bits(square >> 1) * kSquareSize;
-        const std::size_t first = y0 * width_ + x0;
-        const std::size_t last = first + (kSquareSize - 1) * (width_ + 1);
-        if (x0 + kSquareSize <= x_end && last < rays_left) {
-            for (std::size_t i = 0; i < kSquareSize * kSquareSize; ++i) {
-                out[filled++] =
-                    static_cast<std::uint32_t>(first + i / kSquareSize * width_ + i % kSquareSize);
-            }
-            continue;
-        }
         for (std::size_t y = y0; y < y0 + kSquareSize; ++y) {
             for (std::size_t x = x0; x < std::min(x0 + kSquareSize, x_end); ++x) {
                 const std::size_t ray = y * width_ + x;
@@ -52,7 +60,7 @@ std::size_t PixelOrder::fill(std::size_t tile, Indices& out) const noexcept {
             }
         }
     }
-    return filled;
+    return {filled, 0};
 }
 
 }  // namespace packet

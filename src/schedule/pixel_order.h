@@ -9,10 +9,17 @@
 
 namespace packet {
 
+/// The rays of a tile, as TraceBatch has them.
+struct PixelTile {
+    std::size_t count;
+    int row_bits;  ///< 2^row_bits rays follow each other from each index on
+};
+
 class PixelOrder {
 public:
     static constexpr std::size_t kTileSize = 32;
-    static constexpr std::size_t kSquareSize = 4;
+    static constexpr int kSquareBits = 2;
+    static constexpr std::size_t kSquareSize = std::size_t{1} << kSquareBits;
     using Indices = std::array<std::uint32_t, kTileSize * kTileSize>;
 
     /// `count` rays, `width` to a line; the last line may be short. A width of 0, or one that does
@@ -23,10 +30,13 @@ public:
     [[nodiscard]] std::size_t tile_count() const noexcept { return tiles_x_ * tiles_y_; }
     /// The ray that a tile's indices count from.
     [[nodiscard]] std::size_t first_ray(std::size_t tile) const noexcept;
-    /// Fills in the tile's rays, relative to first_ray(), and returns their number.
-    std::size_t fill(std::size_t tile, Indices& out) const noexcept;
+    /// Fills in the rays of a tile, relative to first_ray().
+    PixelTile fill(std::size_t tile, Indices& out) const noexcept;
 
 private:
+    /// Whether rays of a tile are an image's to its last line and column.
+    [[nodiscard]] bool is_whole(std::size_t tile) const noexcept;
+
     std::size_t count_ = 0, width_ = 0, tiles_x_ = 0, tiles_y_ = 0;
 };
 

@@ -46,8 +46,10 @@ void RayTasks::run(std::size_t task, TraceBatch batch,
         first = 0;
     } else if (image_.is_image()) {
         first = image_.first_ray(task);
-        batch.count = image_.fill(task, pixels);
+        const PixelTile tile = image_.fill(task, pixels);
         batch.order = pixels.data();
+        batch.count = tile.count;
+        batch.row_bits = tile.row_bits;
     } else if (orders_ != nullptr) {
         sorted = orders_->take();
         batch.order = sorted->sort(rays_.subspan(first, batch.count), find_keys_).data();

@@ -161,7 +161,7 @@ private:
     static TraceBatch part_of(TraceBatch task, std::size_t first, std::size_t most) {
         task.count = std::min(task.count - first, most);
         if (task.order != nullptr) {
-            task.order += first;
+            task.order += first >> task.row_bits;
             return task;
         }
         task.rays += first;
