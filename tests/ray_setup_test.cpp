@@ -15,12 +15,12 @@ using namespace packet::test;
 namespace {
 
 using Isa = isa::Scalar;
-constexpr int N = 8;
-using F = Float<N, Isa>;
+constexpr int kLanes = 8;
+using F = Float<kLanes, Isa>;
 
-RayLanes<N, Isa> lanes_of(const Ray* rays) {
-    RayLanes<N, Isa> out;
-    for (int i = 0; i < N; ++i) {
+RayLanes<kLanes, Isa> lanes_of(const Ray* rays) {
+    RayLanes<kLanes, Isa> out;
+    for (int i = 0; i < kLanes; ++i) {
         for (int a = 0; a < 3; ++a) {
             out.org[a].r[i] = rays[i].org[a];
             out.dir[a].r[i] = rays[i].dir[a];
@@ -48,13 +48,13 @@ TEST_CASE("boxes are grown by the farthest corner, wherever rays start") {
         const glm::vec3 one = size * (random.point() - 0.5f),
                         other = size * (random.point() - 0.5f);
         const TreeView tree = tree_of({glm::min(one, other), glm::max(one, other)});
-        std::vector<Ray> rays(N);
+        std::vector<Ray> rays(kLanes);
         for (Ray& ray : rays) {
             const float far = std::ldexp(size, static_cast<int>(random.next() % 8) - 4);
             ray.org = far * (2.0f * random.point() - 1.0f);
             ray.dir = random.direction();
         }
-        const RayLanes<N, Isa> lanes = lanes_of(rays.data());
+        const RayLanes<kLanes, Isa> lanes = lanes_of(rays.data());
         F reach(0.0f);
         for (int a = 0; a < 3; ++a) {
             reach = max(reach, abs(F(tree.lower[a]) - lanes.org[a]));
@@ -73,7 +73,7 @@ TEST_CASE("rays that are not steep are prepared as steep ones are, to the bit") 
         const float size = std::ldexp(1.0f, is_huge ? 110 + exponent / 10 : exponent);
         const Bounds3f box = {glm::vec3(-size), glm::vec3(size) * (1.0f + random.point())};
         const TreeView tree = tree_of(box);
-        std::vector<Ray> rays = random_rays(box, N + 1, random.next());
+        std::vector<Ray> rays = random_rays(box, kLanes + 1, random.next());
         Ray* const first = rays.data() + 1;  // the one before goes along an axis
         float& x = first->dir[round / 4 % 3];
         if (round % 4 == 0) {
@@ -83,14 +83,14 @@ TEST_CASE("rays that are not steep are prepared as steep ones are, to the bit") 
         } else if (is_huge) {
             x *= 0x1p-26f;
         }
-        const RayLanes<N, Isa> lanes = lanes_of(first);
-        PreparedRays<N, Isa> prepared;
-        prepare(prepared, tree, lanes, (1u << N) - 1);
+        const RayLanes<kLanes, Isa> lanes = lanes_of(first);
+        PreparedRays<kLanes, Isa> prepared;
+        prepare(prepared, tree, lanes, (1u << kLanes) - 1);
 
         const F(&reciprocal)[3] = prepared.hit.reciprocal;
         const F least = min(abs(reciprocal[0]), min(abs(reciprocal[1]), abs(reciprocal[2])));
         const F limit = min(F(kLargestFloat), least * F(0x1p32f));
-        PreparedRays<N, Isa> other = prepared;
+        PreparedRays<kLanes, Isa> other = prepared;
         prepare_steep_nodes(other, lanes, box_growth(tree, lanes), limit);
         bool is_bounded = false, is_open = false;
         for (int a = 0; a < 3; ++a) {
@@ -105,10 +105,10 @@ TEST_CASE("rays that are not steep are prepared as steep ones are, to the bit") 
         too_far += is_open && !is_bounded ? 1 : 0;
         if (is_bounded || is_open) CHECK(prepared.is_steep);
 
-        const ExitOrigins<N, Isa> exits(prepared, tree, lanes);
+        const ExitOrigins<kLanes, Isa> exits(prepared, tree, lanes);
         const F growth = box_growth(tree, lanes);
         for (int a = 0; a < 3; ++a) {
-            for (int i = 0; i < N; ++i) {
+            for (int i = 0; i < kLanes; ++i) {
                 const float inv_dir = prepared.inv_dir[a].r[i];
                 const float more = node_growth(growth, lanes.org[a]).r[i];
                 for (int side = 0; side < 2; ++side) {
@@ -133,16 +133,16 @@ TEST_CASE("packets with one octant and longest axis are prepared as rays of any 
     int shared = 0, mixed = 0;
     for (int round = 0; round < 2000; ++round) {
         const glm::vec3 towards = random.direction();
-        std::vector<Ray> rays(N);
+        std::vector<Ray> rays(kLanes);
         for (Ray& ray : rays) {
             ray.org = 2.0f * random.point() - 1.0f;
             ray.dir = towards * random.uniform(0.1f, 3.0f);
             ray.dir.x *= random.uniform(0.99f, 1.0f);
         }
         if (round % 8 == 0) rays[3].dir.y = -rays[3].dir.y;
-        const RayLanes<N, Isa> lanes = lanes_of(rays.data());
-        PreparedRays<N, Isa> together, alone;
-        prepare(together, tree, lanes, (1u << N) - 1);
+        const RayLanes<kLanes, Isa> lanes = lanes_of(rays.data());
+        PreparedRays<kLanes, Isa> together, alone;
+        prepare(together, tree, lanes, (1u << kLanes) - 1);
         prepare_boxes(alone, tree, lanes);
         prepare_shear(alone, lanes);
         const bool is_shared = together.directions == Directions::kShared;
@@ -151,7 +151,7 @@ TEST_CASE("packets with one octant and longest axis are prepared as rays of any 
         CHECK(same_bits(together.shear.shear_y, alone.shear.shear_y));
         CHECK(same_bits(together.hit.scale_z, alone.hit.scale_z));
         CHECK(same_bits(together.speed, alone.speed));
-        const Float3<N, Isa> org = rotate_axes(alone.shear, lanes.org);
+        const Float3<kLanes, Isa> org = rotate_axes(alone.shear, lanes.org);
         CHECK(same_bits(together.shear.org[0], is_shared ? org.x : lanes.org[0]));
         CHECK(same_bits(together.shear.org[1], is_shared ? org.y : lanes.org[1]));
         CHECK(same_bits(together.shear.org[2], is_shared ? org.z : lanes.org[2]));
@@ -174,8 +174,8 @@ TEST_CASE("rays are usable if their numbers are finite, in order, and go somewhe
     constexpr float kInfinity = std::numeric_limits<float>::infinity(), kNan = NAN;
     const Ray good = {{1.0f, 2.0f, 3.0f}, 0.0f, {0.0f, -1.0f, 1e30f}, kInfinity};
     const auto is_usable = [](const Ray& ray) {
-        const std::vector<Ray> rays(N, ray);
-        return usable(lanes_of(rays.data())).bits() == (1u << N) - 1;
+        const std::vector<Ray> rays(kLanes, ray);
+        return usable(lanes_of(rays.data())).bits() == (1u << kLanes) - 1;
     };
     CHECK(is_usable(good));
     for (int a = 0; a < 3; ++a) {
