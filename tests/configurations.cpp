@@ -34,6 +34,14 @@ static void report_skipped_isas() {
     (void)once;
 }
 
+std::vector<IsaId> cpu_isas() {
+    std::vector<IsaId> out;
+    for (const IsaId isa : built_isas()) {
+        if (cpu_supports(isa)) out.push_back(isa);
+    }
+    return out;
+}
+
 std::vector<Build> all_builds() {
     std::vector<Build> out;
     for (const AccelName& accel : accel_names()) {
@@ -57,9 +65,7 @@ std::vector<Configuration> all_configurations(AccelKind accel) {
     report_skipped_isas();
     std::vector<Configuration> out;
     for (const ModeName& mode : mode_names()) {
-        for (const IsaId isa : built_isas()) {
-            if (cpu_supports(isa)) out.push_back({accel, mode.mode, isa, 1});
-        }
+        for (const IsaId isa : cpu_isas()) out.push_back({accel, mode.mode, isa, 1});
         for (const int threads : {2, 3}) out.push_back({accel, mode.mode, default_isa(), threads});
     }
     return out;

@@ -33,6 +33,9 @@ struct Build {
 /// tests need.
 [[nodiscard]] std::vector<Build> all_builds();
 
+/// The instruction sets that this CPU runs.
+[[nodiscard]] std::vector<IsaId> cpu_isas();
+
 /// Modes x instruction sets that this CPU runs, on one thread, and on 2 and 3 threads by the best
 /// of them. What the CPU lacks is reported once as skipped.
 [[nodiscard]] std::vector<Configuration> all_configurations(AccelKind accel);

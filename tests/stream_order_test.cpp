@@ -125,8 +125,7 @@ TEST_CASE("keys are the same by every instruction set") {
     const OriginCells cells = find_origin_cells(std::span(rays).first(scattered));
     // The last one's planes lie where rays start.
     for (const OriginCells& by : {cells, OriginCells{}, OriginCells{{-7, -2, -1}, 1.0f}}) {
-        for (const IsaId isa : built_isas()) {
-            if (!cpu_supports(isa)) continue;
+        for (const IsaId isa : cpu_isas()) {
             for (const std::size_t count :
                  {std::size_t{1}, std::size_t{7}, std::size_t{8}, std::size_t{9}, rays.size()}) {
                 std::vector<std::uint32_t> keys(count + 1, 123);

@@ -1,11 +1,12 @@
 // By what kernel rays are traced, by what they look like and by what there is to hit.
 #include "schedule/trace_plan.h"
-#include "oracle.h"
+#include "configurations.h"
 #include "random.h"
 #include "test_rays.h"
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -129,7 +130,7 @@ TEST_CASE("whether they share leaves or not, rays hit what the oracle says") {
 TEST_CASE("where an image's tiles go into several octants, rays hit what the oracle says") {
     // The octants' borders lie within blocks of 16 x 8, of whole tiles and of those at the edge.
     constexpr int kWidth = 72, kHeight = 64;
-    const Scene scene = square_of(12);
+    const Scene one = square_of(12), two = square_of(12, AccelKind::kBvh, 2);
     for (const glm::vec3 middle :
          {glm::vec3(27.3f, 29.7f, 80.0f), glm::vec3(69.2f, 12.6f, 80.0f)}) {
         std::vector<Ray> rays;
@@ -141,18 +142,25 @@ TEST_CASE("where an image's tiles go into several octants, rays hit what the ora
                 rays.push_back(ray);
             }
         }
-        const std::vector<Hit> want = Oracle(scene).closest(rays);
         TraceOptions options;
         options.width = kWidth;
-        REQUIRE(make_plan(scene.accel(), rays, TraceQuery::kClosest, options, 1).kernel ==
-                KernelTable::kTile);
-        for (const IsaId isa : built_isas()) {
-            if (!cpu_supports(isa)) continue;
-            CAPTURE(to_string(isa));
-            options.isa = isa;
-            std::vector<Hit> got(rays.size());
-            trace_closest(scene, rays, got, options);
-            CHECK(got == want);
+        for (const Scene* scene : {&one, &two}) {  // of two instances any-hit rays go by tiles, too
+            const std::vector<Hit> want = Oracle(*scene).closest(rays);
+            const auto kernel = [&](TraceQuery query) {
+                return make_plan(scene->accel(), rays, query, options, 1).kernel;
+            };
+            REQUIRE(kernel(TraceQuery::kClosest) == KernelTable::kTile);
+            REQUIRE((scene == &one || kernel(TraceQuery::kAny) == KernelTable::kTile));
+            for (const IsaId isa : cpu_isas()) {
+                CAPTURE(to_string(isa));
+                options.isa = isa;
+                std::vector<Hit> got(rays.size());
+                trace_closest(*scene, rays, got, options);
+                CHECK(got == want);
+                std::vector<std::uint8_t> occluded(rays.size(), 7);
+                trace_any(*scene, rays, occluded, options);
+                CHECK(std::ranges::equal(occluded, want, {}, {}, &Hit::is_hit));
+            }
         }
     }
 }
