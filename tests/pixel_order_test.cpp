@@ -8,64 +8,100 @@
 
 using namespace packet;
 
+namespace {
+
+/// How often each ray is in a tile. The tiles whose last row and line are those of squares, and
+/// they alone, are to be whole.
+std::vector<int> count_rays(const PixelOrder& order, std::size_t count, const PixelLayout& layout) {
+    std::vector<int> times(count, 0);
+    for (std::size_t tile = 0; tile < order.tile_count(); ++tile) {
+        PixelOrder::Indices indices;
+        const PixelTile rays = order.fill(tile, indices);
+        const std::size_t tiles = (layout.width + 31) / 32;
+        const std::size_t x = tile % tiles * 32, y = tile / tiles * 32;
+        const std::size_t width = std::min<std::size_t>(32, layout.width - x);
+        const std::size_t lines = std::min<std::size_t>(32, count / layout.width - y);
+        const bool is_whole =
+            width % 4 == 0 && lines % 4 == 0 && (lines == 32 || count % layout.width == 0);
+        CHECK(rays.row_bits == (is_whole ? 2 : 0));
+        CHECK((!is_whole || rays.count == width * lines));
+        const std::size_t row = std::size_t{1} << rays.row_bits;
+        for (std::size_t i = 0; i < rays.count; ++i) {
+            const std::size_t ray = order.first_ray(tile) + indices[i / row] + i % row;
+            REQUIRE(ray < count);
+            ++times[ray];
+        }
+    }
+    return times;
+}
+
+}  // namespace
+
 TEST_CASE("an image's tiles hold each of its rays once, whole ones row by row") {
-    constexpr std::size_t kCounts[] = {129, 31 * 96 + 40, 3072, 6401};
-    for (const int width : {1, 4, 31, 32, 33, 64, 96, 100}) {
+    constexpr std::size_t kCounts[] = {129, 31 * 96 + 40, 3072, 6401, 6400};
+    for (const std::size_t width : {1, 4, 31, 32, 33, 36, 64, 96, 100}) {
         for (const std::size_t count : kCounts) {
-            const PixelOrder order(count, width);
-            REQUIRE(order.is_image());
-            std::vector<int> times(count, 0);
-            std::size_t whole = 0;
-            for (std::size_t tile = 0; tile < order.tile_count(); ++tile) {
-                PixelOrder::Indices indices;
-                const PixelTile rays = order.fill(tile, indices);
-                const std::size_t row = std::size_t{1} << rays.row_bits;
-                const bool is_whole = rays.row_bits != 0;
-                whole += is_whole ? 1 : 0;
-                CHECK((!is_whole || (row == 4 && rays.count == indices.size())));
-                for (std::size_t i = 0; i < rays.count; ++i) {
-                    const std::size_t ray = order.first_ray(tile) + indices[i / row] + i % row;
-                    REQUIRE(ray < count);
-                    ++times[ray];
-                }
-            }
             CAPTURE(width);
             CAPTURE(count);
+            const PixelLayout layout = PixelLayout::scanlines(width);
+            const PixelOrder order(count, layout);
+            REQUIRE(order.is_image());
+            const std::vector<int> times = count_rays(order, count, layout);
             CHECK(std::ranges::all_of(times, [](int n) { return n == 1; }));
-            // A tile is whole if the last of its rays is there.
-            const auto line = static_cast<std::size_t>(width);
-            std::size_t expected = 0;
-            for (std::size_t y = 31; y * line < count; y += 32) {
-                for (std::size_t x = 31; x < line; x += 32)
-                    expected += y * line + x < count ? 1 : 0;
+        }
+    }
+    for (const std::size_t block_width : {4, 8, 16, 32}) {
+        for (const std::size_t block_height : {4, 8, 16, 32}) {
+            for (const std::size_t width : {1, 2, 3, 5}) {
+                const PixelLayout layout{width * block_width, block_width, block_height};
+                const std::size_t count = layout.width * block_height * 3;
+                CAPTURE(layout.width);
+                CAPTURE(block_width);
+                CAPTURE(block_height);
+                const std::vector<int> times = count_rays(PixelOrder(count, layout), count, layout);
+                CHECK(std::ranges::all_of(times, [](int n) { return n == 1; }));
             }
-            CHECK(whole == expected);
         }
     }
 }
 
+TEST_CASE("what leaves no two lines, or is wider than 32 bits index, is no image") {
+    CHECK_FALSE(PixelOrder(100, PixelLayout()).is_image());
+    CHECK_FALSE(PixelOrder(100, PixelLayout::scanlines(100)).is_image());
+    CHECK(PixelOrder(101, PixelLayout::scanlines(100)).is_image());
+    CHECK_FALSE(PixelOrder(std::size_t{1} << 40, PixelLayout::scanlines(1u << 26)).is_image());
+}
+
 TEST_CASE("of a tile sixteen rays are a square, and 128 a block of 16 x 8") {
     constexpr std::size_t kWidth = 64;
-    const PixelOrder order(kWidth * 64, kWidth);
-    PixelOrder::Indices indices;
-    for (std::size_t tile = 0; tile < order.tile_count(); ++tile) {
-        const PixelTile rays = order.fill(tile, indices);
-        REQUIRE(rays.row_bits == 2);
-        const auto pixel = [&](std::size_t i) { return indices[i / 4] + i % 4; };
-        const auto check = [&](std::size_t count, std::size_t width, std::size_t height) {
-            for (std::size_t first = 0; first < rays.count; first += count) {
-                std::size_t x[2] = {kWidth, 0}, y[2] = {kWidth, 0};
-                for (std::size_t i = first; i < first + count; ++i) {
-                    x[0] = std::min(x[0], pixel(i) % kWidth);
-                    x[1] = std::max(x[1], pixel(i) % kWidth);
-                    y[0] = std::min(y[0], pixel(i) / kWidth);
-                    y[1] = std::max(y[1], pixel(i) / kWidth);
-                }
-                CHECK(x[1] - x[0] + 1 == width);
-                CHECK(y[1] - y[0] + 1 == height);
+    for (const PixelLayout& layout :
+         {PixelLayout::scanlines(kWidth), PixelLayout{kWidth, 4, 4}, PixelLayout{kWidth, 16, 8}}) {
+        std::vector<std::size_t> x_of(kWidth * 64), y_of(kWidth * 64);
+        for (std::size_t y = 0; y < 64; ++y) {
+            for (std::size_t x = 0; x < kWidth; ++x) {
+                x_of[layout.column(x) + layout.row(y)] = x;
+                y_of[layout.column(x) + layout.row(y)] = y;
             }
-        };
-        check(16, 4, 4);
-        check(128, 16, 8);
+        }
+        const PixelOrder order(kWidth * 64, layout);
+        PixelOrder::Indices indices;
+        for (std::size_t tile = 0; tile < order.tile_count(); ++tile) {
+            const PixelTile rays = order.fill(tile, indices);
+            REQUIRE(rays.row_bits == 2);
+            const auto check = [&](std::size_t count, std::size_t width, std::size_t height) {
+                for (std::size_t first = 0; first < rays.count; first += count) {
+                    std::vector<std::size_t> x, y;
+                    for (std::size_t i = first; i < first + count; ++i) {
+                        const std::size_t ray = order.first_ray(tile) + indices[i / 4] + i % 4;
+                        x.push_back(x_of[ray]);
+                        y.push_back(y_of[ray]);
+                    }
+                    CHECK(std::ranges::max(x) - std::ranges::min(x) + 1 == width);
+                    CHECK(std::ranges::max(y) - std::ranges::min(y) + 1 == height);
+                }
+            };
+            check(16, 4, 4);
+            check(128, 16, 8);
+        }
     }
 }

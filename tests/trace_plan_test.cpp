@@ -85,7 +85,7 @@ TEST_CASE("rays that cohere go by tiles where leaves are large, and by streams w
     }
 }
 
-TEST_CASE("rays of an image are near each other if they are known to be an image's") {
+TEST_CASE("rays of an image are near each other, whether it is said or shows") {
     constexpr int kSide = 64;
     std::vector<Ray> rays;
     for (int row = 0; row < kSide; ++row) {
@@ -97,21 +97,28 @@ TEST_CASE("rays of an image are near each other if they are known to be an image
             rays.push_back(ray);
         }
     }
+    // Of lines that are more than a 32nd of all rays nobody knows that they are an image's.
+    const auto strip = std::span(rays).first(std::size_t{kSide} * kSide / 4);
     const Scene coarse = square_of(8), middling = square_of(64), fine = square_of(512);
     for (const Mode mode : {Mode::kAuto, Mode::kTile}) {
-        CAPTURE(to_string(mode));
-        TraceOptions of_image, of_rays;
-        of_image.mode = of_rays.mode = mode;
-        of_image.width = kSide;
-        const auto kernel = [&](const Scene& scene, const TraceOptions& options) {
-            return make_plan(scene.accel(), rays, TraceQuery::kClosest, options, 1).kernel;
-        };
-        CHECK(kernel(coarse, of_image) == KernelTable::kTile);
-        CHECK(kernel(coarse, of_rays) == KernelTable::kTile);
-        CHECK(kernel(middling, of_image) == KernelTable::kTile);
-        CHECK(kernel(middling, of_rays) == KernelTable::kStream);
-        CHECK(kernel(fine, of_image) == KernelTable::kStream);
-        CHECK(kernel(fine, of_rays) == KernelTable::kStream);
+        for (const int width : {0, kSide}) {
+            CAPTURE(to_string(mode));
+            CAPTURE(width);
+            TraceOptions options;
+            options.mode = mode;
+            options.width = width;
+            const auto plan_of = [&](const Scene& scene, std::span<const Ray> some) {
+                return make_plan(scene.accel(), some, TraceQuery::kClosest, options, 1);
+            };
+            CHECK(plan_of(coarse, rays).kernel == KernelTable::kTile);
+            CHECK(plan_of(coarse, rays).image == PixelLayout::scanlines(kSide));
+            CHECK(plan_of(middling, rays).kernel == KernelTable::kTile);
+            CHECK(plan_of(fine, rays).kernel == KernelTable::kStream);
+            CHECK(plan_of(coarse, strip).kernel == KernelTable::kTile);
+            CHECK(plan_of(coarse, strip).image.is_image() == (width != 0));
+            CHECK(plan_of(middling, strip).kernel ==
+                  (width != 0 ? KernelTable::kTile : KernelTable::kStream));
+        }
     }
 }
 
@@ -142,10 +149,10 @@ TEST_CASE("where an image's tiles go into several octants, rays hit what the ora
                 rays.push_back(ray);
             }
         }
-        TraceOptions options;
-        options.width = kWidth;
         for (const Scene* scene : {&one, &two}) {  // of two instances any-hit rays go by tiles, too
             const std::vector<Hit> want = Oracle(*scene).closest(rays);
+            TraceOptions options;
+            options.width = kWidth;
             const auto kernel = [&](TraceQuery query) {
                 return make_plan(scene->accel(), rays, query, options, 1).kernel;
             };
@@ -154,6 +161,43 @@ TEST_CASE("where an image's tiles go into several octants, rays hit what the ora
             for (const IsaId isa : cpu_isas()) {
                 CAPTURE(to_string(isa));
                 options.isa = isa;
+                std::vector<Hit> got(rays.size());
+                trace_closest(*scene, rays, got, options);
+                CHECK(got == want);
+                std::vector<std::uint8_t> occluded(rays.size(), 7);
+                trace_any(*scene, rays, occluded, options);
+                CHECK(std::ranges::equal(occluded, want, {}, {}, &Hit::is_hit));
+            }
+        }
+    }
+}
+
+TEST_CASE("in whatever layout an image's rays come, they hit what the oracle says") {
+    constexpr std::size_t kWidth = 96, kHeight = 64;
+    const Scene one = square_of(12), two = square_of(12, AccelKind::kBvh, 2);
+    for (const PixelLayout& layout :
+         {PixelLayout::scanlines(kWidth), PixelLayout{kWidth, 4, 4}, PixelLayout{kWidth, 8, 8},
+          PixelLayout{kWidth, 16, 32}, PixelLayout{kWidth, 32, 16}}) {
+        CAPTURE(layout.block_width);
+        std::vector<Ray> rays(kWidth * kHeight);
+        for (std::size_t y = 0; y < kHeight; ++y) {
+            for (std::size_t x = 0; x < kWidth; ++x) {
+                Ray& ray = rays[layout.column(x) + layout.row(y)];
+                ray.org = glm::vec3(0.43f, 0.57f, 0.3f);
+                ray.dir = (glm::vec3(x, y, 0) - glm::vec3(39.4f, 29.7f, 80.0f)) / 80.0f;
+            }
+        }
+        for (const Scene* scene : {&one, &two}) {
+            for (const TraceQuery query : {TraceQuery::kClosest, TraceQuery::kAny}) {
+                if (scene == &one && query == TraceQuery::kAny) continue;  // go by streams
+                const TracePlan of = plan(*scene, rays, query);
+                REQUIRE(of.kernel == KernelTable::kTile);
+                REQUIRE(of.image == layout);
+            }
+            const std::vector<Hit> want = Oracle(*scene).closest(rays);
+            for (const int threads : {1, 2}) {
+                TraceOptions options;
+                options.threads = threads;
                 std::vector<Hit> got(rays.size());
                 trace_closest(*scene, rays, got, options);
                 CHECK(got == want);

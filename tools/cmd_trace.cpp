@@ -175,7 +175,7 @@ void add_trace_command(CLI::App& program) {
         ->check(CLI::Range(1, 1'000'000))
         ->capture_default_str();
     app.add_option("--width", command->common.trace.width,
-                   "The rays are an image's, so many to a line; 0 if they are not")
+                   "The rays are an image's, so many to a line; 0 if that is not known")
         ->check(CLI::Range(0, kUnbounded))
         ->capture_default_str();
     app.add_flag("--flatten", command->flatten, "Bake all instances into one mesh first");

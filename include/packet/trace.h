@@ -72,7 +72,8 @@ struct TraceOptions {
     /// Threads to trace with, at most the CPU's; 0 takes all of them, 1 starts none.
     int threads = 0;
     /// If not 0, the rays are an image's in scanline order, this many to a line. They are then
-    /// traced in square tiles, which cohere better; the hits keep the rays' order.
+    /// traced in square tiles, which cohere better; the hits keep the rays' order. If 0, `kAuto`
+    /// and `kTile` look whether 1,024 rays or more are an image's, in scanlines or in blocks.
     int width = 0;
     /// Kernels to use; without a value default_isa().
     std::optional<IsaId> isa;

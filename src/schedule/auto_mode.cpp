@@ -38,12 +38,6 @@ bool go_together(Run run) {
     });
 }
 
-/// How far a ray goes, about, that starts at `org`.
-float distance_to_hit(const glm::vec3& org, const Bounds3f& world) {
-    const glm::vec3 to_world = glm::max(glm::max(world.lower - org, org - world.upper), 0.0f);
-    return glm::length(to_world) + kHitDistance * glm::length(world.extent());
-}
-
 /// How far apart, in the mean, rays `stride`, 2 stride ... of a run are from the one before where
 /// they hit something.
 float mean_step(Run run, std::size_t stride, const Bounds3f& world) {
@@ -70,6 +64,11 @@ bool mostly(std::span<const Ray> rays, std::size_t length, Test test) {
 
 }  // namespace
 
+float distance_to_hit(const glm::vec3& org, const Bounds3f& world) {
+    const glm::vec3 to_world = glm::max(glm::max(world.lower - org, org - world.upper), 0.0f);
+    return glm::length(to_world) + kHitDistance * glm::length(world.extent());
+}
+
 bool are_coherent(std::span<const Ray> rays, const Bounds3f& world) {
     const float diagonal = glm::length(world.extent());
     return rays.size() >= kRunLength && mostly(rays, kRunLength, [&](Run run) {
@@ -77,10 +76,10 @@ bool are_coherent(std::span<const Ray> rays, const Bounds3f& world) {
            });
 }
 
-bool share_leaves(std::span<const Ray> rays, int width, const Bounds3f& world, float leaf_spacing) {
-    const bool is_image = width != 0;
-    const std::size_t stride = is_image ? 1 : kTileRays / kRunLength;
-    const float most = leaf_spacing * (is_image ? kLeavesPerPixel : kLeavesPerStep);
+bool share_leaves(std::span<const Ray> rays, bool in_rows, const Bounds3f& world,
+                  float leaf_spacing) {
+    const std::size_t stride = in_rows ? 1 : kTileRays / kRunLength;
+    const float most = leaf_spacing * (in_rows ? kLeavesPerPixel : kLeavesPerStep);
     const std::size_t length = stride * kRunLength;
     return rays.size() < length ||
            mostly(rays, length, [&](Run run) { return mean_step(run, stride, world) <= most; });

@@ -11,10 +11,13 @@ namespace packet {
 /// Whether neighbours start close together and go the same way in half of the sample or more. O(1).
 [[nodiscard]] bool are_coherent(std::span<const Ray> rays, const Bounds3f& world);
 
-/// Whether rays of a tile mostly hit the same leaves, if these are `leaf_spacing` apart. How far
-/// rays go nobody knows yet: from where they enter `world` on a part of its diagonal. `width` as
-/// in TraceOptions. O(1).
-[[nodiscard]] bool share_leaves(std::span<const Ray> rays, int width, const Bounds3f& world,
+/// How far a ray goes that starts at `org`, which nobody knows yet: to where it enters `world`, and
+/// on a part of its diagonal. O(1).
+[[nodiscard]] float distance_to_hit(const glm::vec3& org, const Bounds3f& world);
+
+/// Whether rays of a tile mostly hit the same leaves, if these are `leaf_spacing` apart, about
+/// where they hit something. Neighbours are `in_rows` if they are so in an image. O(1).
+[[nodiscard]] bool share_leaves(std::span<const Ray> rays, bool in_rows, const Bounds3f& world,
                                 float leaf_spacing);
 
 /// Whether neighbours start anywhere: only rays that come later, if any, start near them. O(1).

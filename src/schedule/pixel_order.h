@@ -1,7 +1,9 @@
-// The order in which an image's rays are traced if they come in scanline order: square tiles, in
+// The order in which an image's rays are traced, whatever their layout: square tiles, in
 // them squares of 4 x 4 along a Morton curve. So a packet of 16 is a square, one of 8 is half of
 // it, and 128 rays are a block of 16 x 8.
 #pragma once
+
+#include "schedule/pixel_layout.h"
 
 #include <array>
 #include <cstddef>
@@ -22,11 +24,11 @@ public:
     static constexpr std::size_t kSquareSize = std::size_t{1} << kSquareBits;
     using Indices = std::array<std::uint32_t, kTileSize * kTileSize>;
 
-    /// `count` rays, `width` to a line; the last line may be short. A width of 0, or one that does
-    /// not leave two lines, or that 32 bits cannot index, means no image.
-    PixelOrder(std::size_t count, int width) noexcept;
+    /// `count` rays; the last scanline may be short. A width that does not leave two lines, or that
+    /// 32 bits cannot index, means no image.
+    PixelOrder(std::size_t count, const PixelLayout& layout) noexcept;
 
-    [[nodiscard]] bool is_image() const noexcept { return width_ != 0; }
+    [[nodiscard]] bool is_image() const noexcept { return layout_.is_image(); }
     [[nodiscard]] std::size_t tile_count() const noexcept { return tiles_x_ * tiles_y_; }
     /// The ray that a tile's indices count from.
     [[nodiscard]] std::size_t first_ray(std::size_t tile) const noexcept;
@@ -34,10 +36,9 @@ public:
     PixelTile fill(std::size_t tile, Indices& out) const noexcept;
 
 private:
-    /// Whether rays of a tile are an image's to its last line and column.
-    [[nodiscard]] bool is_whole(std::size_t tile) const noexcept;
-
-    std::size_t count_ = 0, width_ = 0, tiles_x_ = 0, tiles_y_ = 0;
+    std::size_t count_ = 0;
+    PixelLayout layout_;
+    std::size_t tiles_x_ = 0, tiles_y_ = 0;
 };
 
 }  // namespace packet

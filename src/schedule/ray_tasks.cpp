@@ -15,7 +15,7 @@ std::size_t rays_per_stream_task(std::size_t rays, int threads) noexcept {
 
 RayTasks RayTasks::sorted(std::span<const Ray> rays, int threads,
                           KernelTable::StreamKeys find_keys) {
-    RayTasks out(rays, 0);
+    RayTasks out(rays, PixelLayout());
     out.find_keys_ = find_keys;
     out.run_length_ = rays_per_stream_task(rays.size(), threads);
     out.orders_ = std::make_unique<StreamOrders>();

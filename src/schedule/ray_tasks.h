@@ -23,8 +23,9 @@ inline constexpr std::size_t kLeastRaysForStreams = 1024;
 
 class RayTasks {
 public:
-    /// `width` rays to a line of an image, or 0.
-    RayTasks(std::span<const Ray> rays, int width) : rays_(rays), image_(rays.size(), width) {}
+    /// Tiles of an image, or runs.
+    RayTasks(std::span<const Ray> rays, const PixelLayout& image)
+        : rays_(rays), image_(rays.size(), image) {}
     /// Runs that are sorted, as streams need them.
     [[nodiscard]] static RayTasks sorted(std::span<const Ray> rays, int threads,
                                          KernelTable::StreamKeys find_keys);

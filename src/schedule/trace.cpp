@@ -42,7 +42,7 @@ public:
           plan_(make_plan(scene_, rays, query, options, parallel_.threads())),
           tasks_(plan_.sorting != Sorting::kNone
                      ? RayTasks::sorted(rays, parallel_.threads(), find_keys_)
-                     : RayTasks(rays, options.width)),
+                     : RayTasks(rays, plan_.image)),
           tries_(plan_.packets_below != 0.0 && tasks_.count() >= kLeastTasksForTries) {
         if (options.width < 0) {
             throw Error(ErrorCode::kBadValue, "width is " + std::to_string(options.width) +

@@ -5,6 +5,9 @@
 #include "schedule/stream_order.h"
 #include "schedule/treelet_sweep.h"
 
+#include <algorithm>
+#include <optional>
+
 namespace packet {
 
 namespace {
@@ -14,6 +17,8 @@ constexpr std::size_t kLeastRaysTogether = 8 * StreamOrder::kMostRays;
 // Rays that meet less than this have not enough of the way in common to pay for being read and
 // written in an order that is far from theirs. Measured: docs/experiments.md#streams.
 constexpr double kLeastCostTogether = 28.0;
+// Neighbours that are looked at whether they share leaves are to be of one row.
+constexpr std::size_t kLeastRow = 8;
 
 KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
@@ -53,8 +58,10 @@ TracePlan plan_streams(const SceneAccel& scene, std::span<const Ray> rays) {
 
 /// Closest-hit, or any-hit of rays in the order in which they are to be traced. Where there
 /// are no streams to take rays for which tiles are slow, packets are tried.
-TracePlan plan_tiles(const SceneAccel& scene) {
-    return {.kernel = KernelTable::kTile, .packets_below = has_one_tree(scene.view) ? 0.0 : 0.9};
+TracePlan plan_tiles(const SceneAccel& scene, const PixelLayout& image) {
+    return {.kernel = KernelTable::kTile,
+            .packets_below = has_one_tree(scene.view) ? 0.0 : 0.9,
+            .image = image};
 }
 
 /// Whether so many rays are worth sorting, and may be traced by streams.
@@ -62,38 +69,46 @@ bool may_stream(const SceneAccel& scene, std::span<const Ray> rays) {
     return rays.size() >= kLeastRaysForStreams && has_one_tree(scene.view);
 }
 
-/// Whether tiles suit the rays: where there are no streams for those that do not share leaves, it
-/// is enough that they cohere.
-bool fit_tiles(const SceneAccel& scene, std::span<const Ray> rays, int width) {
+/// The rays' layout, as `given` or as it shows, if tiles suit them; where there are no streams for
+/// those that do not share leaves, it is enough that they cohere.
+std::optional<PixelLayout> fit_tiles(const SceneAccel& scene, std::span<const Ray> rays,
+                                     const PixelLayout& given) {
     const Bounds3f& world = scene.top.bounds;
-    if (!are_coherent(rays, world)) return false;
-    return !may_stream(scene, rays) ||
-           share_leaves(rays, width, world, scene.trees[scene.mesh_of_instance[0]].leaf_spacing);
+    if (!are_coherent(rays, world)) return std::nullopt;
+    const PixelLayout image = given.is_image() ? given : find_layout(rays, world);
+    if (!may_stream(scene, rays)) return image;
+    const float leaf_spacing = scene.trees[scene.mesh_of_instance[0]].leaf_spacing;
+    const bool in_rows = given.is_image() || image.block_width >= kLeastRow;
+    if (!share_leaves(rays, in_rows, world, leaf_spacing)) return std::nullopt;
+    return image;
 }
 
-TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode, int width) {
+TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode mode,
+                        const PixelLayout& given) {
     switch (mode) {
         case Mode::kTreelet:
             if (has_treelets(scene.view)) return plan_treelets();
             [[fallthrough]];
         case Mode::kStream:
             if (has_one_tree(scene.view)) return plan_streams(scene, rays);
-            return {KernelTable::kSingle};
-        case Mode::kTile:
+            return {.kernel = KernelTable::kSingle, .image = given};
+        case Mode::kTile: {
+            const auto image = fit_tiles(scene, rays, given);
             // Others fit no beam or share no leaves: tiles would be packets, the slowest of all.
-            if (may_stream(scene, rays) && !fit_tiles(scene, rays, width)) {
-                return plan_streams(scene, rays);
-            }
-            return plan_tiles(scene);
-        default: return {kernel_of(mode)};
+            if (!image && may_stream(scene, rays)) return plan_streams(scene, rays);
+            return plan_tiles(scene, image.value_or(given));
+        }
+        default: return {.kernel = kernel_of(mode), .image = given};
     }
 }
 
 /// As the rays and the query suggest: docs/experiments.md#tiles-and-single-rays.
 TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
-                        int width, int threads) {
-    if (fit_tiles(scene, rays, width)) {
-        if (!may_stream(scene, rays) || query == TraceQuery::kClosest) return plan_tiles(scene);
+                        const PixelLayout& given, int threads) {
+    if (const auto image = fit_tiles(scene, rays, given)) {
+        if (!may_stream(scene, rays) || query == TraceQuery::kClosest) {
+            return plan_tiles(scene, *image);
+        }
         return {KernelTable::kStream, Sorting::kByTask};
     }
     // Rays that start near each other meet the same nodes by streams already, and any-hit rays are
@@ -105,15 +120,16 @@ TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, Trac
         return plan_treelets();
     }
     if (may_stream(scene, rays)) return plan_streams(scene, rays);
-    return {.kernel = KernelTable::kSingle, .packets_below = 1.0};
+    return {.kernel = KernelTable::kSingle, .packets_below = 1.0, .image = given};
 }
 
 }  // namespace
 
 TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
                     const TraceOptions& options, int threads) {
-    return options.mode == Mode::kAuto ? plan_by_looks(scene, rays, query, options.width, threads)
-                                       : plan_as_asked(scene, rays, options.mode, options.width);
+    const auto given = PixelLayout::scanlines(static_cast<std::size_t>(std::max(options.width, 0)));
+    return options.mode == Mode::kAuto ? plan_by_looks(scene, rays, query, given, threads)
+                                       : plan_as_asked(scene, rays, options.mode, given);
 }
 
 }  // namespace packet

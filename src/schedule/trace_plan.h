@@ -3,6 +3,7 @@
 
 #include "kernels/kernel_table.h"
 #include "scene/scene_accel.h"
+#include "schedule/pixel_layout.h"
 
 #include <packet/trace.h>
 
@@ -26,6 +27,7 @@ struct TracePlan {
     /// its time; 0: they are not.
     double packets_below = 0.0;
     bool by_treelets = false;  ///< by kernels of their own
+    PixelLayout image = {};    ///< the order of unsorted rays, if they are an image's
 };
 
 /// By the mode and the width of `options`, and `threads` of their own. `Mode::kAuto` looks at a

@@ -1,0 +1,124 @@
+// What rays of which nobody says that they are an image's are taken for.
+#include "schedule/pixel_layout.h"
+#include "random.h"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <vector>
+
+using namespace packet;
+
+namespace {
+
+const Bounds3f kWorld{glm::vec3(-1.0f), glm::vec3(1.0f)};
+
+struct Camera {
+    bool is_parallel = false;
+    float jitter = 0.0f;  ///< in pixels
+    float slope = 1.0f;   ///< half of the view's longer side at distance 1
+};
+
+std::vector<Ray> image(std::size_t width, std::size_t height, const PixelLayout& layout,
+                       const Camera& camera = {}) {
+    tools::Random random(7);
+    std::vector<Ray> rays(width * height);
+    const float scale = 2.0f * camera.slope / static_cast<float>(std::max(width, height));
+    for (std::size_t y = 0; y < height; ++y) {
+        for (std::size_t x = 0; x < width; ++x) {
+            const float column = static_cast<float>(x) + camera.jitter * random.uniform();
+            const float line = static_cast<float>(y) + camera.jitter * random.uniform();
+            const glm::vec3 place(scale * (column - 0.5f * static_cast<float>(width)),
+                                  scale * (0.5f * static_cast<float>(height) - line), 0.0f);
+            Ray& ray = rays[layout.column(x) + layout.row(y)];
+            ray.org = glm::vec3(0.1f, 0.2f, 3.0f) + (camera.is_parallel ? place : glm::vec3(0.0f));
+            ray.dir = glm::vec3(0.0f, 0.0f, -1.0f) + (camera.is_parallel ? glm::vec3(0) : place);
+        }
+    }
+    return rays;
+}
+
+constexpr Camera kCameras[] = {{}, {.slope = 0.1f}, {.is_parallel = true}, {.jitter = 1.0f}};
+
+PixelLayout scanlines(std::size_t width) { return PixelLayout::scanlines(width); }
+
+}  // namespace
+
+TEST_CASE("scanlines show where lines end") {
+    struct Size {
+        std::size_t width, height;
+    };
+    for (const Camera& camera : kCameras) {
+        for (const Size& size : {Size{32, 33}, Size{65, 64}, Size{100, 80}, Size{101, 77},
+                                 Size{640, 33}, Size{33, 640}}) {
+            CAPTURE(size.width);
+            CAPTURE(camera.jitter);
+            const PixelLayout layout = scanlines(size.width);
+            auto rays = image(size.width, size.height, layout, camera);
+            CHECK(find_layout(rays, kWorld) == layout);
+            rays.resize(rays.size() - 10);  // the last line is short
+            CHECK(find_layout(rays, kWorld) == layout);
+        }
+    }
+}
+
+TEST_CASE("so do blocks of pixels") {
+    for (const Camera& camera : kCameras) {
+        for (const std::size_t width : {4, 8, 16, 32}) {
+            for (const std::size_t height : {4, 8, 16, 32}) {
+                // 4 jittered pixels make no line that can be told from a few more
+                if (camera.jitter != 0.0f && (width == 4 || height == 4)) continue;
+                for (const std::size_t blocks : {2, 3, 16}) {
+                    const PixelLayout layout{blocks * width, width, height};
+                    const std::size_t lines = 1024 / (blocks * width * height) + 2;
+                    const auto rays = image(layout.width, lines * height, layout, camera);
+                    CAPTURE(width);
+                    CAPTURE(height);
+                    CAPTURE(blocks);
+                    CAPTURE(camera.is_parallel);
+                    CHECK(find_layout(rays, kWorld) == layout);
+                }
+            }
+        }
+    }
+}
+
+TEST_CASE("other blocks are images as wide as they are, if they do not fill one as well") {
+    CHECK(find_layout(image(256, 128, {256, 64, 64}), kWorld) == scanlines(64));
+    CHECK(find_layout(image(120, 120, {120, 12, 12}), kWorld) == scanlines(12));
+    auto rays = image(128, 128, {128, 16, 16});
+    rays.resize(rays.size() - 100);
+    CHECK(find_layout(rays, kWorld) == scanlines(16));
+    rays = image(128, 128, {128, 4, 4});
+    rays.resize(rays.size() - 100);
+    CHECK_FALSE(find_layout(rays, kWorld).is_image());
+}
+
+TEST_CASE("what shows no image is none") {
+    const auto is_image = [](const std::vector<Ray>& rays) {
+        return find_layout(rays, kWorld).is_image();
+    };
+    CHECK(is_image(image(64, 64, scanlines(64))));
+    CHECK_FALSE(is_image({}));
+    CHECK_FALSE(is_image(image(31, 33, scanlines(31))));      // too few
+    CHECK_FALSE(is_image(image(1024, 31, scanlines(1024))));  // lines are too long
+    auto rays = image(128, 128, scanlines(128));
+    for (std::uint32_t seed = 0; seed < 20; ++seed) {
+        std::ranges::shuffle(rays, std::mt19937(seed));
+        CAPTURE(seed);
+        CHECK_FALSE(is_image(rays));
+    }
+    std::ranges::fill(rays, rays[0]);
+    CHECK_FALSE(is_image(rays));
+    for (const float bad :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 0.0f}) {
+        for (Ray& ray : rays) ray.dir = glm::vec3(bad);
+        CHECK_FALSE(is_image(rays));
+    }
+    // Some that are no rays do not hide the others' layout, nor are read beyond.
+    rays = image(128, 128, scanlines(128));
+    for (std::size_t i = 300; i < rays.size(); i += 37) rays[i].dir = glm::vec3(0.0f);
+    CHECK(find_layout(rays, kWorld) == scanlines(128));
+}
