@@ -110,6 +110,21 @@ TEST_CASE("what shows no image is none") {
         CAPTURE(seed);
         CHECK_FALSE(is_image(rays));
     }
+    // Pieces of lines, as long as they please: the first looks like a line, and none is below it.
+    const auto pixels = image(128, 128, scanlines(128));
+    tools::Random random(3);
+    for (int turn = 0; turn < 20; ++turn) {
+        CAPTURE(turn);
+        rays.clear();
+        while (rays.size() < pixels.size()) {
+            const auto first =
+                static_cast<std::size_t>(random.uniform() * static_cast<float>(pixels.size() - 64));
+            const auto length = static_cast<std::size_t>(10.0f + 40.0f * random.uniform());
+            rays.insert(rays.end(), pixels.begin() + static_cast<std::ptrdiff_t>(first),
+                        pixels.begin() + static_cast<std::ptrdiff_t>(first + length));
+        }
+        CHECK_FALSE(is_image(rays));
+    }
     std::ranges::fill(rays, rays[0]);
     CHECK_FALSE(is_image(rays));
     for (const float bad :
