@@ -65,12 +65,13 @@ TEST_CASE("scanlines show where lines end") {
 }
 
 TEST_CASE("so do blocks of pixels") {
+    constexpr std::size_t kSides[] = {4, 8, 16, 32}, kBlocks[] = {2, 3, 16};
     for (const Camera& camera : kCameras) {
-        for (const std::size_t width : {4, 8, 16, 32}) {
-            for (const std::size_t height : {4, 8, 16, 32}) {
+        for (const std::size_t width : kSides) {
+            for (const std::size_t height : kSides) {
                 // 4 jittered pixels make no line that can be told from a few more
                 if (camera.jitter != 0.0f && (width == 4 || height == 4)) continue;
-                for (const std::size_t blocks : {2, 3, 16}) {
+                for (const std::size_t blocks : kBlocks) {
                     const PixelLayout layout{blocks * width, width, height};
                     const std::size_t lines = 1024 / (blocks * width * height) + 2;
                     const auto rays = image(layout.width, lines * height, layout, camera);

@@ -39,7 +39,8 @@ std::vector<int> count_rays(const PixelOrder& order, std::size_t count, const Pi
 
 TEST_CASE("an image's tiles hold each of its rays once, whole ones row by row") {
     constexpr std::size_t kCounts[] = {129, 31 * 96 + 40, 3072, 6401, 6400};
-    for (const std::size_t width : {1, 4, 31, 32, 33, 36, 64, 96, 100}) {
+    constexpr std::size_t kWidths[] = {1, 4, 31, 32, 33, 36, 64, 96, 100};
+    for (const std::size_t width : kWidths) {
         for (const std::size_t count : kCounts) {
             CAPTURE(width);
             CAPTURE(count);
@@ -50,9 +51,10 @@ TEST_CASE("an image's tiles hold each of its rays once, whole ones row by row") 
             CHECK(std::ranges::all_of(times, [](int n) { return n == 1; }));
         }
     }
-    for (const std::size_t block_width : {4, 8, 16, 32}) {
-        for (const std::size_t block_height : {4, 8, 16, 32}) {
-            for (const std::size_t width : {1, 2, 3, 5}) {
+    constexpr std::size_t kSides[] = {4, 8, 16, 32}, kBlocks[] = {1, 2, 3, 5};
+    for (const std::size_t block_width : kSides) {
+        for (const std::size_t block_height : kSides) {
+            for (const std::size_t width : kBlocks) {
                 const PixelLayout layout{width * block_width, block_width, block_height};
                 const std::size_t count = layout.width * block_height * 3;
                 CAPTURE(layout.width);
