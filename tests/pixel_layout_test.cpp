@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 #include <vector>
@@ -73,7 +74,8 @@ TEST_CASE("so do blocks of pixels") {
                 if (camera.jitter != 0.0f && (width == 4 || height == 4)) continue;
                 for (const std::size_t blocks : kBlocks) {
                     const PixelLayout layout{blocks * width, width, height};
-                    const std::size_t lines = 1024 / (blocks * width * height) + 2;
+                    const std::size_t lines = 32 / height + 1;  // a line is a 32nd at most
+                    if (blocks * width * height * lines < 1024) continue;
                     const auto rays = image(layout.width, lines * height, layout, camera);
                     CAPTURE(width);
                     CAPTURE(height);
@@ -95,6 +97,48 @@ TEST_CASE("other blocks are images as wide as they are, if they do not fill one 
     rays = image(128, 128, {128, 4, 4});
     rays.resize(rays.size() - 100);
     CHECK_FALSE(find_layout(rays, kWorld).is_image());
+}
+
+TEST_CASE("an image that is a line of blocks, or one whose lines never turn, has no blocks") {
+    CHECK(find_layout(image(32, 32, {32, 32, 32}), kWorld) == scanlines(32));
+    CHECK_FALSE(find_layout(image(4096, 4, {4096, 4, 4}), kWorld).is_image());
+    // All around: lines go on where they began.
+    constexpr std::size_t kWidth = 256;
+    constexpr PixelLayout kBlocks{kWidth, 4, 4};
+    std::vector<Ray> rays(kWidth * 64);
+    for (std::size_t y = 0; y < 64; ++y) {
+        for (std::size_t x = 0; x < kWidth; ++x) {
+            const float turn = 6.2831853f * static_cast<float>(x) / kWidth;
+            Ray& ray = rays[kBlocks.column(x) + kBlocks.row(y)];
+            ray.org = glm::vec3(0.0f);
+            ray.dir = {std::cos(turn), 0.0245f * (static_cast<float>(y) - 32.0f), std::sin(turn)};
+        }
+    }
+    CHECK_FALSE(find_layout(rays, kWorld).is_image());
+    // Where a block begins are no rays.
+    rays = image(128, 128, {128, 4, 4});
+    for (std::size_t i = 16; i < rays.size(); i += 16) rays[i].dir = glm::vec3(0.0f);
+    CHECK_FALSE(find_layout(rays, kWorld).is_image());
+}
+
+TEST_CASE("pixels along a Morton curve are as near as can be, and no image's lines") {
+    for (const Camera& camera : kCameras) {
+        for (const std::size_t side : {std::size_t{32}, std::size_t{64}, std::size_t{256}}) {
+            for (const bool y_first : {false, true}) {
+                const auto scanned = image(side, side, scanlines(side), camera);
+                std::vector<Ray> rays(side * side);
+                for (std::size_t i = 0; i < rays.size(); ++i) {
+                    std::size_t at[2] = {0, 0};
+                    for (std::size_t bit = 0; bit < 16; ++bit)
+                        at[bit % 2] |= (i >> bit & 1) << bit / 2;
+                    rays[i] = scanned[at[y_first ? 1 : 0] + at[y_first ? 0 : 1] * side];
+                }
+                CAPTURE(side);
+                CAPTURE(camera.jitter);
+                CHECK_FALSE(find_layout(rays, kWorld).is_image());
+            }
+        }
+    }
 }
 
 TEST_CASE("what shows no image is none") {
@@ -133,6 +177,15 @@ TEST_CASE("what shows no image is none") {
         for (Ray& ray : rays) ray.dir = glm::vec3(bad);
         CHECK_FALSE(is_image(rays));
     }
+    rays = image(64, 64, scanlines(64));
+    for (Ray& ray : rays) ray.org.x = std::numeric_limits<float>::infinity();
+    CHECK_FALSE(is_image(rays));
+    // The first are a block, others end nowhere or are no rays.
+    rays = image(128, 128, {128, 4, 4});
+    for (std::size_t i = 16; i < rays.size(); ++i) rays[i] = rays[i % 16];
+    CHECK_FALSE(is_image(rays));
+    for (std::size_t i = 16; i < rays.size(); ++i) rays[i].dir = glm::vec3(0.0f);
+    CHECK_FALSE(is_image(rays));
     // Some that are no rays do not hide the others' layout, nor are read beyond.
     rays = image(128, 128, scanlines(128));
     for (std::size_t i = 300; i < rays.size(); i += 37) rays[i].dir = glm::vec3(0.0f);

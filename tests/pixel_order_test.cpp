@@ -56,7 +56,7 @@ TEST_CASE("an image's tiles hold each of its rays once, whole ones row by row") 
         for (const std::size_t block_height : kSides) {
             for (const std::size_t width : kBlocks) {
                 const PixelLayout layout{width * block_width, block_width, block_height};
-                const std::size_t count = layout.width * block_height * 3;
+                const std::size_t count = layout.width * block_height * 11;
                 CAPTURE(layout.width);
                 CAPTURE(block_width);
                 CAPTURE(block_height);
@@ -72,6 +72,26 @@ TEST_CASE("what leaves no two lines, or is wider than 32 bits index, is no image
     CHECK_FALSE(PixelOrder(100, PixelLayout::scanlines(100)).is_image());
     CHECK(PixelOrder(101, PixelLayout::scanlines(100)).is_image());
     CHECK_FALSE(PixelOrder(std::size_t{1} << 40, PixelLayout::scanlines(1u << 26)).is_image());
+}
+
+TEST_CASE("tiles of more rays than 32 bits index count from their first ray") {
+    constexpr std::size_t kCount = std::size_t{1} << 33, kWidth = (std::size_t{1} << 25) + 32;
+    for (const PixelLayout& layout :
+         {PixelLayout::scanlines(kWidth), PixelLayout{kWidth, 32, 32}, PixelLayout{kWidth, 4, 4}}) {
+        const std::size_t lines = kCount / kWidth / 32 * 32, count = lines * kWidth;
+        const PixelOrder order(count, layout);
+        PixelOrder::Indices indices;
+        const std::size_t tile = order.tile_count() - 1;
+        const PixelTile rays = order.fill(tile, indices);
+        REQUIRE(rays.row_bits == 2);
+        REQUIRE(rays.count == 1024);
+        for (std::size_t line = 0; line < 4; ++line) {
+            CHECK(order.first_ray(tile) + indices[line] ==
+                  layout.column(kWidth - 32) + layout.row(lines - 32 + line));
+        }
+        for (std::size_t i = 0; i < 256; ++i) CHECK(order.first_ray(tile) + indices[i] + 3 < count);
+        CHECK(order.first_ray(tile) + indices[255] + 3 == count - 1);
+    }
 }
 
 TEST_CASE("of a tile sixteen rays are a square, and 128 a block of 16 x 8") {

@@ -53,6 +53,46 @@ TracePlan plan(const Scene& scene, std::span<const Ray> rays,
     return make_plan(scene.accel(), rays, query, options, 1);
 }
 
+/// Of a camera above the square's middle that looks down through the pixel (x_middle, y_middle);
+/// pixels are 1 / `scale` apart at distance 1.
+std::vector<Ray> image_rays(const PixelLayout& layout, std::size_t height, float x_middle,
+                            float y_middle, float scale) {
+    std::vector<Ray> rays(layout.width * height);
+    for (std::size_t y = 0; y < height; ++y) {
+        for (std::size_t x = 0; x < layout.width; ++x) {
+            Ray& ray = rays[layout.column(x) + layout.row(y)];
+            ray.org = glm::vec3(0.43f, 0.57f, 0.3f);
+            ray.dir = glm::vec3((static_cast<float>(x) - x_middle) / scale,
+                                (static_cast<float>(y) - y_middle) / scale, -1.0f);
+        }
+    }
+    return rays;
+}
+
+/// Rays that go by tiles, but those of any-hit where there are streams, against the oracle.
+void check_tiles(const Scene& scene, const std::vector<Ray>& rays, TraceOptions options) {
+    const auto kernel = [&](TraceQuery query) {
+        return make_plan(scene.accel(), rays, query, options, 1).kernel;
+    };
+    REQUIRE(kernel(TraceQuery::kClosest) == KernelTable::kTile);
+    REQUIRE((scene.accel().view.is_single_mesh || kernel(TraceQuery::kAny) == KernelTable::kTile));
+    const std::vector<Hit> want = Oracle(scene).closest(rays);
+    for (const IsaId isa : cpu_isas()) {
+        for (const int threads : {1, 2}) {
+            CAPTURE(to_string(isa));
+            CAPTURE(threads);
+            options.isa = isa;
+            options.threads = threads;
+            std::vector<Hit> got(rays.size());
+            trace_closest(scene, rays, got, options);
+            CHECK(got == want);
+            std::vector<std::uint8_t> occluded(rays.size(), 7);
+            trace_any(scene, rays, occluded, options);
+            CHECK(std::ranges::equal(occluded, want, {}, {}, &Hit::is_hit));
+        }
+    }
+}
+
 }  // namespace
 
 TEST_CASE("rays that cohere go by tiles where leaves are large, and by streams where small") {
@@ -136,77 +176,43 @@ TEST_CASE("whether they share leaves or not, rays hit what the oracle says") {
 
 TEST_CASE("where an image's tiles go into several octants, rays hit what the oracle says") {
     // The octants' borders lie within blocks of 16 x 8, of whole tiles and of those at the edge.
-    constexpr int kWidth = 72, kHeight = 64;
+    constexpr std::size_t kWidth = 72, kHeight = 64;
     const Scene one = square_of(12), two = square_of(12, AccelKind::kBvh, 2);
-    for (const glm::vec3 middle :
-         {glm::vec3(27.3f, 29.7f, 80.0f), glm::vec3(69.2f, 12.6f, 80.0f)}) {
-        std::vector<Ray> rays;
-        for (int row = 0; row < kHeight; ++row) {
-            for (int column = 0; column < kWidth; ++column) {
-                Ray ray;
-                ray.org = glm::vec3(0.43f, 0.57f, 0.3f);
-                ray.dir = (glm::vec3(column, row, 0) - middle) / 80.0f;
-                rays.push_back(ray);
-            }
-        }
-        for (const Scene* scene : {&one, &two}) {  // of two instances any-hit rays go by tiles, too
-            const std::vector<Hit> want = Oracle(*scene).closest(rays);
-            TraceOptions options;
-            options.width = kWidth;
-            const auto kernel = [&](TraceQuery query) {
-                return make_plan(scene->accel(), rays, query, options, 1).kernel;
-            };
-            REQUIRE(kernel(TraceQuery::kClosest) == KernelTable::kTile);
-            REQUIRE((scene == &one || kernel(TraceQuery::kAny) == KernelTable::kTile));
-            for (const IsaId isa : cpu_isas()) {
-                CAPTURE(to_string(isa));
-                options.isa = isa;
-                std::vector<Hit> got(rays.size());
-                trace_closest(*scene, rays, got, options);
-                CHECK(got == want);
-                std::vector<std::uint8_t> occluded(rays.size(), 7);
-                trace_any(*scene, rays, occluded, options);
-                CHECK(std::ranges::equal(occluded, want, {}, {}, &Hit::is_hit));
-            }
-        }
+    for (const auto& [x, y] : {std::pair(27.3f, 29.7f), std::pair(69.2f, 12.6f)}) {
+        const auto rays = image_rays(PixelLayout::scanlines(kWidth), kHeight, x, y, 80.0f);
+        TraceOptions options;
+        options.width = kWidth;
+        check_tiles(one, rays, options);
+        check_tiles(two, rays, options);
     }
 }
 
 TEST_CASE("in whatever layout an image's rays come, they hit what the oracle says") {
-    constexpr std::size_t kWidth = 96, kHeight = 64;
+    struct Image {
+        PixelLayout layout;
+        std::size_t height;
+    };
     const Scene one = square_of(12), two = square_of(12, AccelKind::kBvh, 2);
-    for (const PixelLayout& layout :
-         {PixelLayout::scanlines(kWidth), PixelLayout{kWidth, 4, 4}, PixelLayout{kWidth, 8, 8},
-          PixelLayout{kWidth, 16, 32}, PixelLayout{kWidth, 32, 16}}) {
-        CAPTURE(layout.block_width);
-        std::vector<Ray> rays(kWidth * kHeight);
-        for (std::size_t y = 0; y < kHeight; ++y) {
-            for (std::size_t x = 0; x < kWidth; ++x) {
-                Ray& ray = rays[layout.column(x) + layout.row(y)];
-                ray.org = glm::vec3(0.43f, 0.57f, 0.3f);
-                ray.dir = (glm::vec3(x, y, 0) - glm::vec3(39.4f, 29.7f, 80.0f)) / 80.0f;
-            }
-        }
-        for (const Scene* scene : {&one, &two}) {
-            for (const TraceQuery query : {TraceQuery::kClosest, TraceQuery::kAny}) {
-                if (scene == &one && query == TraceQuery::kAny) continue;  // go by streams
-                const TracePlan of = plan(*scene, rays, query);
-                REQUIRE(of.kernel == KernelTable::kTile);
-                REQUIRE(of.image == layout);
-            }
-            const std::vector<Hit> want = Oracle(*scene).closest(rays);
-            for (const int threads : {1, 2}) {
-                TraceOptions options;
-                options.threads = threads;
-                std::vector<Hit> got(rays.size());
-                trace_closest(*scene, rays, got, options);
-                CHECK(got == want);
-                std::vector<std::uint8_t> occluded(rays.size(), 7);
-                trace_any(*scene, rays, occluded, options);
-                CHECK(std::ranges::equal(occluded, want, {}, {}, &Hit::is_hit));
-            }
-        }
+    for (const Image& image :
+         {Image{PixelLayout::scanlines(100), 73}, Image{{72, 4, 4}, 76}, Image{{72, 8, 8}, 104},
+          Image{{80, 16, 32}, 96}, Image{{96, 32, 16}, 80}}) {
+        CAPTURE(image.layout.block_width);
+        const float middle = 0.4f * static_cast<float>(image.layout.width);
+        const auto rays = image_rays(image.layout, image.height, middle, 29.7f, 80.0f);
+        REQUIRE(plan(one, rays).image == image.layout);
+        check_tiles(one, rays, {});
+        check_tiles(two, rays, {});
     }
+}
+
+TEST_CASE("of images whose tiles are enough to try packets, too") {
+    // At the lower and right edge tiles are 8 and 12 pixels wide and high.
+    const Scene two = square_of(2, AccelKind::kBvh, 2);
+    const PixelLayout layout{360, 4, 4};
+    const auto rays = image_rays(layout, 396, 170.0f, 180.0f, 400.0f);
+    REQUIRE(plan(two, rays).image == layout);
+    REQUIRE(plan(two, rays).packets_below > 0.0);
+    check_tiles(two, rays, {});
 }
 
 TEST_CASE("any-hit rays go by streams, sorted by task, whether they cohere or not") {

@@ -51,13 +51,13 @@ public:
         }
         return count;
     }
-    /// As before_jump(), but before the first that goes back on the step before it, be it as short.
-    /// Jittered neighbours may, blocks do not.
+    /// As before_jump(), but before the first that goes back on the step before it, be it as short,
+    /// or is no number. Jittered neighbours may go back, blocks do not.
     [[nodiscard]] std::size_t before_turn(std::size_t stride, std::size_t count) const {
         glm::vec3 last = of(0), last_step(0.0f);
         for (std::size_t i = 1; i < count; ++i) {
             const glm::vec3 point = of(i * stride), step = point - last;
-            if (glm::dot(step, last_step) < 0.0f) return i;
+            if (!(glm::dot(step, last_step) >= 0.0f)) return i;
             last = point;
             last_step = step;
         }
@@ -81,8 +81,10 @@ PixelLayout guess_layout(const Points& points, std::size_t count) {
     const std::size_t height = points.before_jump(width, std::min(count / width, kMostSide + 1));
     if (is_side(width) && is_side(height)) {
         const std::size_t block = width * height;
-        const std::size_t line = width * points.before_turn(block, count / block);
-        if (count % (line * height) == 0) return {line, width, height};
+        const std::size_t most_blocks = std::min(most / width, count / block - 1);
+        const std::size_t line = width * points.before_turn(block, most_blocks + 1);
+        const bool has_turn = line <= width * most_blocks;
+        if (has_turn && count % (line * height) == 0) return {line, width, height};
     }
     return width >= kLeastWidth ? PixelLayout::scanlines(width) : PixelLayout{};
 }
@@ -115,7 +117,7 @@ bool is_confirmed(const PixelLayout& layout, const Points& points, std::size_t c
         if (is_square && kLeastSpread * (right + down) <= points.distance(ray, last)) ++confirmed;
         last = ray;
     }
-    return 4 * confirmed >= 3 * samples;
+    return 8 * confirmed >= 7 * samples;
 }
 
 }  // namespace

@@ -32,9 +32,11 @@ struct PixelLayout {
 
 /// The layout of rays of which nobody says that they are an image's, from 1024 on: a camera's rays,
 /// and others whose neighbours pass the scene side by side, jump back where a line or a block ends.
-/// Looked for are scanlines, a 32nd of all rays long at most, and blocks with sides of 4, 8, 16 or
-/// 32 that fill the image; larger ones, and others of 8 pixels and more, are taken for an image as
-/// wide as they are. No image where there is none of these. O(width + height).
+/// Looked for are lines of at most a 32nd of all rays and 16,384 pixels: scanlines from 8 pixels
+/// on, and blocks with sides of 4, 8, 16 or 32 that fill the image; larger ones, and others 8
+/// pixels wide or more, are taken for an image as wide as they are. No image where there is none of
+/// these, and where a bad ray lies where a line or block ends. Looks at as many rays as are in a
+/// line, or as may be, and some 350 more.
 [[nodiscard]] PixelLayout find_layout(std::span<const Ray> rays, const Bounds3f& world);
 
 }  // namespace packet

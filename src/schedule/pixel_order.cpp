@@ -35,7 +35,7 @@ PixelTile PixelOrder::fill(std::size_t tile, Indices& out) const noexcept {
     const std::size_t height = std::min(kTileSize, (left + layout_.width - 1) / layout_.width);
     const std::size_t columns = (width + kSquareSize - 1) / kSquareSize;
     const std::size_t rows = (height + kSquareSize - 1) / kSquareSize;
-    // No square is in two blocks.
+    // The lines of a square are block_width apart: in a block, and in scanlines, too.
     std::size_t column[kSquares], row[kSquares];
     for (std::size_t i = 0; i < columns; ++i) column[i] = layout_.column(x_begin + i * kSquareSize);
     for (std::size_t i = 0; i < rows; ++i) row[i] = layout_.row(i * kSquareSize);

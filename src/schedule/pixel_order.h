@@ -1,4 +1,4 @@
-// The order in which an image's rays are traced, whatever their layout: square tiles, in
+// The order in which an image's rays are traced, in scanlines or in blocks: square tiles, in
 // them squares of 4 x 4 along a Morton curve. So a packet of 16 is a square, one of 8 is half of
 // it, and 128 rays are a block of 16 x 8.
 #pragma once
@@ -24,7 +24,8 @@ public:
     static constexpr std::size_t kSquareSize = std::size_t{1} << kSquareBits;
     using Indices = std::array<std::uint32_t, kTileSize * kTileSize>;
 
-    /// `count` rays; the last scanline may be short. A width that does not leave two lines, or that
+    /// `count` rays: in scanlines, of which the last may be short, or in blocks with sides of 4, 8,
+    /// 16 or 32 that fill an image. A width that does not leave two lines, or that
     /// 32 bits cannot index, means no image.
     PixelOrder(std::size_t count, const PixelLayout& layout) noexcept;
 

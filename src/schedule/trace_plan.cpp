@@ -17,8 +17,9 @@ constexpr std::size_t kLeastRaysTogether = 8 * StreamOrder::kMostRays;
 // Rays that meet less than this have not enough of the way in common to pay for being read and
 // written in an order that is far from theirs. Measured: docs/experiments.md#streams.
 constexpr double kLeastCostTogether = 28.0;
-// Neighbours that are looked at whether they share leaves are to be of one row.
-constexpr std::size_t kLeastRow = 8;
+// Neighbours that are looked at whether they share leaves are eight, from anywhere on: most of them
+// are to be of one row.
+constexpr std::size_t kLeastRow = 16;
 
 KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
@@ -105,16 +106,11 @@ TracePlan plan_as_asked(const SceneAccel& scene, std::span<const Ray> rays, Mode
 /// As the rays and the query suggest: docs/experiments.md#tiles-and-single-rays.
 TracePlan plan_by_looks(const SceneAccel& scene, std::span<const Ray> rays, TraceQuery query,
                         const PixelLayout& given, int threads) {
-    if (const auto image = fit_tiles(scene, rays, given)) {
-        if (!may_stream(scene, rays) || query == TraceQuery::kClosest) {
-            return plan_tiles(scene, *image);
-        }
-        return {KernelTable::kStream, Sorting::kByTask};
-    }
-    // Rays that start near each other meet the same nodes by streams already, and any-hit rays are
-    // as fast by streams: docs/benchmarking.md#treelets.
-    if (query == TraceQuery::kClosest && has_treelets(scene.view) &&
-        are_many_and_scattered(scene, rays) &&
+    // Any-hit rays are as fast by streams as by tiles and treelets: docs/benchmarking.md#treelets.
+    if (query == TraceQuery::kAny && may_stream(scene, rays)) return plan_streams(scene, rays);
+    if (const auto image = fit_tiles(scene, rays, given)) return plan_tiles(scene, *image);
+    // Rays that start near each other meet the same nodes by streams already.
+    if (has_treelets(scene.view) && are_many_and_scattered(scene, rays) &&
         sweeps_beat_streams(rays.size(), scene.view.instances[0].tree->byte_count,
                             scene.stats.sah_cost, threads)) {
         return plan_treelets();

@@ -31,7 +31,8 @@ struct TracePlan {
 };
 
 /// By the mode and the width of `options`, and `threads` of their own. `Mode::kAuto` looks at a
-/// sample of the rays: docs/experiments.md#tiles-and-single-rays. O(1).
+/// sample of the rays: docs/experiments.md#tiles-and-single-rays. O(1), but that of closest-hit
+/// rays that cohere it looks for lines of an image: at a 32nd of them, and 16,384, at most.
 [[nodiscard]] TracePlan make_plan(const SceneAccel& scene, std::span<const Ray> rays,
                                   TraceQuery query, const TraceOptions& options, int threads);
 
