@@ -3,7 +3,12 @@
 
 #include <doctest/doctest.h>
 
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cstddef>
+#include <vector>
 
 using namespace packet;
 
@@ -24,4 +29,24 @@ TEST_CASE("an array lies at the front of a larger one that waits, which is whole
     CHECK(allocate(kLarge) == whole);
     deallocate_aligned(other, kSmall);
     deallocate_aligned(whole, kLarge);
+}
+
+TEST_CASE("pages that are given back hold no memory, until they are written anew") {
+    constexpr std::size_t kBytes = std::size_t{6} << 20;
+    auto* const memory = static_cast<char*>(allocate_aligned(kBytes));
+    const auto resident = [&] {
+        std::vector<unsigned char> pages(kBytes / static_cast<std::size_t>(sysconf(_SC_PAGESIZE)));
+        REQUIRE(mincore(memory, kBytes, pages.data()) == 0);
+        return static_cast<std::size_t>(std::ranges::count(pages, 1));
+    };
+    std::fill_n(memory, kBytes, 'x');
+    CHECK(resident() != 0);
+    give_back_pages(memory, kBytes);
+    CHECK(resident() == 0);
+    std::fill_n(memory, kBytes, 'y');
+    CHECK(memory[kBytes - 1] == 'y');
+    deallocate_aligned(memory, kBytes);
+    char small[64] = {'z'};
+    give_back_pages(small, sizeof small);
+    CHECK(small[0] == 'z');
 }

@@ -19,7 +19,7 @@ enum class AccelKind : std::uint8_t {
     kBvh,
     kBvhMidpoint,  ///< one split at the middle of the centroids
     kBvhMorton,    ///< one by the Morton codes of the centroids: the fastest to build
-    kBvhSpatial,   ///< as kBvh, but cutting triangles where nodes would overlap
+    kBvhSpatial,   ///< as kBvh, but cutting triangles where nodes would overlap, if it pays in all
     kKdMidpoint,   ///< k-d tree, cells cut in the middle, axes in turn
     kKdMedian,     ///< k-d tree, cells cut at the median of what they hold, axes in turn
     kKdSah,        ///< k-d tree, cells cut by the surface area heuristic

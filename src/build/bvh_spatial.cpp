@@ -3,15 +3,21 @@
 // is shared by its children in proportion to what they hold and to their area, so it does not
 // depend on which thread comes first.
 //
+// What is cheaper split by split may cost more in the end, where planes near the root strew parts
+// of large triangles over subtrees, and moving these mends less of it. So the tree without cuts is
+// built, too, and the cheaper one kept.
+//
 // Stich, Friedrich, Dietrich. Spatial splits in bounding volume hierarchies. High-Performance
 // Graphics 2009.
 #include "build/bvh_spatial.h"
 
+#include "build/bvh_sah.h"
 #include "build/cell.h"
 #include "build/object_split.h"
 #include "build/reinsertion.h"
 #include "build/spatial_split.h"
 #include "build/split.h"
+#include "build/wide_cuts.h"
 
 #include <algorithm>
 
@@ -74,18 +80,48 @@ std::size_t room(std::size_t count, const BuildOptions& options) {
         std::min(wanted, static_cast<double>(kMaxReferences - std::min(count, kMaxReferences))));
 }
 
-}  // namespace
-
-Hierarchy build_bvh_spatial(MeshView mesh, ScratchVector<Reference> references,
-                            const BuildOptions& options, const Parallel& parallel) {
+Hierarchy build_with_cuts(MeshView mesh, ScratchVector<Reference> references, std::size_t spare,
+                          const BuildOptions& options, const Parallel& parallel) {
     NodeBounds root;
     parallel.run([&] { root = measure(references, parallel); });
-    const std::size_t spare = room(references.size(), options);
     Hierarchy out = TopDownBuilder(std::move(references), spare, parallel,
                                    SpatialSahSplit(mesh, root.box.half_area(), options, parallel))
                         .build();
     reinsert_subtrees(out, parallel);
     return out;
+}
+
+// Of the time, about; without cuts it takes the rest.
+constexpr double kShareWithCuts = 0.75;
+// Where fewer references than one in so many were added, both trees are about the same.
+constexpr std::size_t kFewCuts = 64;
+
+struct Weight {
+    std::size_t references;
+    double sah_cost;
+};
+Weight weigh(const Hierarchy& hierarchy, const BuildOptions& options, const Parallel& parallel) {
+    const WideCuts cuts(hierarchy, kBlockSize, parallel, 0.0);
+    return {cuts.item_count(0), cuts.stats(options).sah_cost};
+}
+
+}  // namespace
+
+Hierarchy build_bvh_spatial(MeshView mesh, ScratchVector<Reference> references,
+                            const BuildOptions& options, const Parallel& parallel) {
+    const std::size_t count = references.size(), spare = room(count, options);
+    Hierarchy cut = build_with_cuts(mesh, std::move(references), spare, options,
+                                    parallel.part(parallel.threads(), kShareWithCuts));
+    if (count == 0) return cut;
+    const Weight with_cuts = weigh(cut, options, parallel);
+    if (with_cuts.references - count <= count / kFewCuts) return cut;
+    parallel.run([&] { references = collect_references(mesh, parallel).items; });
+    Hierarchy plain = build_bvh_sah(std::move(references), options,
+                                    parallel.part(parallel.threads(), 1.0 - kShareWithCuts));
+    if (weigh(plain, options, parallel).sah_cost < with_cuts.sah_cost) std::swap(cut, plain);
+    // The tree that is made next is not to come on top of both.
+    give_back_pages(plain.nodes.data(), plain.nodes.capacity() * sizeof(BuildNode));
+    return cut;
 }
 
 }  // namespace packet

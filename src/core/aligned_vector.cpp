@@ -165,4 +165,8 @@ void deallocate_aligned(void* memory, std::size_t bytes) noexcept {
     ::operator delete (memory, std::align_val_t{kCacheLine});
 }
 
+void give_back_pages(void* memory, std::size_t bytes) noexcept {
+    if (is_large(bytes)) give_back(memory, in_pages(bytes));
+}
+
 }  // namespace packet

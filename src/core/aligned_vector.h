@@ -14,6 +14,9 @@ namespace packet {
 /// it.
 [[nodiscard]] void* allocate_aligned(std::size_t bytes);
 void deallocate_aligned(void* memory, std::size_t bytes) noexcept;
+/// What an array of `bytes` holds is needed no more: the pages of a large one go to the system at
+/// once, not when it wants them. It may be written anew.
+void give_back_pages(void* memory, std::size_t bytes) noexcept;
 
 template <class T>
 struct CacheLineAllocator {
