@@ -115,8 +115,9 @@ Hierarchy build_bvh_spatial(MeshView mesh, ScratchVector<Reference> references,
     if (count == 0) return cut;
     const Weight with_cuts = weigh(cut, options, parallel);
     if (with_cuts.references - count <= count / kFewCuts) return cut;
-    parallel.run([&] { references = collect_references(mesh, parallel).items; });
-    Hierarchy plain = build_bvh_sah(std::move(references), options,
+    References uncut;
+    parallel.run([&] { uncut = collect_references(mesh, parallel); });
+    Hierarchy plain = build_bvh_sah(std::move(uncut.items), options,
                                     parallel.part(parallel.threads(), 1.0 - kShareWithCuts));
     if (weigh(plain, options, parallel).sah_cost < with_cuts.sah_cost) std::swap(cut, plain);
     // The tree that is made next is not to come on top of both.
