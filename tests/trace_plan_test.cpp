@@ -187,6 +187,25 @@ TEST_CASE("where an image's tiles go into several octants, rays hit what the ora
     }
 }
 
+TEST_CASE("an image goes by tiles in blocks as in scanlines, wherever in blocks samples begin") {
+    const Scene scene = square_of(512);
+    int tiles = 0, streams = 0;
+    for (float scale = 45.0f; scale < 160.0f; scale *= 1.05f) {
+        CAPTURE(scale);
+        const auto kernel = [&](const PixelLayout& layout) {
+            return plan(scene, image_rays(layout, 200, 100.0f, 100.0f, scale)).kernel;
+        };
+        const KernelTable::Kernel want = kernel(PixelLayout::scanlines(200));
+        ++(want == KernelTable::kTile ? tiles : streams);
+        CHECK(kernel({200, 4, 4}) == want);
+        CHECK(kernel({200, 8, 4}) == want);
+        CHECK(kernel({200, 4, 8}) == want);
+        CHECK(kernel({200, 8, 8}) == want);
+    }
+    CHECK(tiles != 0);
+    CHECK(streams != 0);
+}
+
 TEST_CASE("in whatever layout an image's rays come, they hit what the oracle says") {
     struct Image {
         PixelLayout layout;

@@ -38,28 +38,35 @@ bool go_together(Run run) {
     });
 }
 
-/// How far apart, in the mean, rays `stride`, 2 stride ... of a run are from the one before where
-/// they hit something.
-float mean_step(Run run, std::size_t stride, const Bounds3f& world) {
-    const float t = distance_to_hit(run[0].org, world);
+/// How far apart, in the mean, eight rays are from the one before where they hit something. Ray i
+/// is ray_at(i).
+template <class RayAt>
+float mean_step(const Bounds3f& world, RayAt ray_at) {
+    const float t = distance_to_hit(ray_at(0).org, world);
     const auto at_hit = [&](const Ray& ray) { return ray.org + t * glm::normalize(ray.dir); };
     float sum = 0.0f;
-    int steps = 0;
-    for (std::size_t i = stride; i < run.size(); i += stride, ++steps) {
-        sum += glm::distance(at_hit(run[i]), at_hit(run[i - stride]));
+    for (std::size_t i = 1; i < kRunLength; ++i) {
+        sum += glm::distance(at_hit(ray_at(i)), at_hit(ray_at(i - 1)));
     }
-    return sum / static_cast<float>(steps);
+    return sum / static_cast<float>(kRunLength - 1);
 }
 
-/// Whether test(run) holds for half of a sample of runs of `length` neighbours or more. NaN
-/// anywhere makes comparisons false.
+/// Whether test(first) holds for half of a sample of runs of `length` of `count` rays or more,
+/// which start at `first`. NaN anywhere makes comparisons false.
 template <class Test>
-bool mostly(std::span<const Ray> rays, std::size_t length, Test test) {
-    const std::size_t runs = std::min(kMostRuns, rays.size() / length);
-    const std::size_t stride = rays.size() / runs;
+bool mostly(std::size_t count, std::size_t length, Test test) {
+    const std::size_t runs = std::min(kMostRuns, count / length);
+    const std::size_t stride = count / runs;
     std::size_t passed = 0;
-    for (std::size_t i = 0; i < runs; ++i) passed += test(rays.subspan(i * stride, length));
+    for (std::size_t i = 0; i < runs; ++i) passed += test(i * stride);
     return 2 * passed >= runs;
+}
+
+/// Of pixels in scanline order, the first of a run of which `pixel` is one, in one line if it has
+/// so many.
+std::size_t start_in_line(std::size_t pixel, std::size_t width) {
+    const std::size_t x = pixel % width;
+    return width < kRunLength ? pixel : pixel - x + std::min(x, width - kRunLength);
 }
 
 }  // namespace
@@ -71,24 +78,35 @@ float distance_to_hit(const glm::vec3& org, const Bounds3f& world) {
 
 bool are_coherent(std::span<const Ray> rays, const Bounds3f& world) {
     const float diagonal = glm::length(world.extent());
-    return rays.size() >= kRunLength && mostly(rays, kRunLength, [&](Run run) {
+    return rays.size() >= kRunLength && mostly(rays.size(), kRunLength, [&](std::size_t first) {
+               const Run run = rays.subspan(first, kRunLength);
                return go_together(run) && start_together(run, diagonal);
            });
 }
 
-bool share_leaves(std::span<const Ray> rays, bool in_rows, const Bounds3f& world,
+bool share_leaves(std::span<const Ray> rays, const PixelLayout& image, const Bounds3f& world,
                   float leaf_spacing) {
-    const std::size_t stride = in_rows ? 1 : kTileRays / kRunLength;
-    const float most = leaf_spacing * (in_rows ? kLeavesPerPixel : kLeavesPerStep);
-    const std::size_t length = stride * kRunLength;
-    return rays.size() < length ||
-           mostly(rays, length, [&](Run run) { return mean_step(run, stride, world) <= most; });
+    if (image.is_image()) {
+        return rays.size() < kRunLength || mostly(rays.size(), kRunLength, [&](std::size_t pixel) {
+                   const std::size_t first = start_in_line(pixel, image.width);
+                   return mean_step(world, [&](std::size_t i) -> const Ray& {
+                              const std::size_t y = (first + i) / image.width;
+                              return rays[image.column((first + i) % image.width) + image.row(y)];
+                          }) <= kLeavesPerPixel * leaf_spacing;
+               });
+    }
+    return rays.size() < kTileRays || mostly(rays.size(), kTileRays, [&](std::size_t first) {
+               return mean_step(world, [&](std::size_t i) -> const Ray& {
+                          return rays[first + i * (kTileRays / kRunLength)];
+                      }) <= kLeavesPerStep * leaf_spacing;
+           });
 }
 
 bool are_scattered(std::span<const Ray> rays, const Bounds3f& world) {
     const float diagonal = glm::length(world.extent());
-    return rays.size() >= kRunLength &&
-           !mostly(rays, kRunLength, [&](Run run) { return start_together(run, diagonal); });
+    return rays.size() >= kRunLength && !mostly(rays.size(), kRunLength, [&](std::size_t first) {
+               return start_together(rays.subspan(first, kRunLength), diagonal);
+           });
 }
 
 }  // namespace packet

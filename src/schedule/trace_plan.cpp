@@ -17,9 +17,6 @@ constexpr std::size_t kLeastRaysTogether = 8 * StreamOrder::kMostRays;
 // Rays that meet less than this have not enough of the way in common to pay for being read and
 // written in an order that is far from theirs. Measured: docs/experiments.md#streams.
 constexpr double kLeastCostTogether = 28.0;
-// Neighbours that are looked at whether they share leaves are eight, from anywhere on: most of them
-// are to be of one row.
-constexpr std::size_t kLeastRow = 16;
 
 KernelTable::Kernel kernel_of(Mode mode) {
     switch (mode) {
@@ -79,8 +76,7 @@ std::optional<PixelLayout> fit_tiles(const SceneAccel& scene, std::span<const Ra
     const PixelLayout image = given.is_image() ? given : find_layout(rays, world);
     if (!may_stream(scene, rays)) return image;
     const float leaf_spacing = scene.trees[scene.mesh_of_instance[0]].leaf_spacing;
-    const bool in_rows = given.is_image() || image.block_width >= kLeastRow;
-    if (!share_leaves(rays, in_rows, world, leaf_spacing)) return std::nullopt;
+    if (!share_leaves(rays, image, world, leaf_spacing)) return std::nullopt;
     return image;
 }
 
