@@ -51,13 +51,13 @@ public:
         }
         return count;
     }
-    /// As before_jump(), but before the first that goes back on the step before it, be it as short,
-    /// or is no number. Jittered neighbours may go back, blocks do not.
+    /// As before_jump(), but before the first that goes back on the step before it, be it as short.
+    /// Jittered neighbours may, blocks do not.
     [[nodiscard]] std::size_t before_turn(std::size_t stride, std::size_t count) const {
         glm::vec3 last = of(0), last_step(0.0f);
         for (std::size_t i = 1; i < count; ++i) {
             const glm::vec3 point = of(i * stride), step = point - last;
-            if (!(glm::dot(step, last_step) >= 0.0f)) return i;
+            if (glm::dot(step, last_step) < 0.0f) return i;
             last = point;
             last_step = step;
         }
