@@ -1,5 +1,7 @@
 #include "contender.h"
 
+#include "spread.h"
+
 #include <timing.h>
 
 #include <cstddef>
@@ -38,6 +40,23 @@ Contender our_contender(const Scene& scene, const ModeName& name) {
         trace_closest(scene, rays, hits, base);
     };
     return {Side::kOurs, std::string(name.name), trace, closest};
+}
+
+Contender calling_contender(const Scene& scene) {
+    constexpr std::size_t kTaskSize = 4096;  // rays
+    const auto trace = [&scene](const RaySet& set, Answers& answers, int threads) {
+        spread(set.rays.size(), kTaskSize, threads, [&](std::size_t first, std::size_t count) {
+            for (std::size_t i = first; i < first + count; ++i) {
+                const Ray& ray = set.rays[i];
+                if (set.query == Query::kClosest) answers.hits[i] = trace_closest(scene, ray);
+                if (set.query == Query::kAny) answers.occluded[i] = trace_any(scene, ray) ? 1 : 0;
+            }
+        });
+    };
+    const auto closest = [&scene](std::span<const Ray> rays, std::span<Hit> hits) {
+        for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = trace_closest(scene, rays[i]);
+    };
+    return {Side::kOurs, "call", trace, closest};
 }
 
 Contender embree_contender(const EmbreeScene& scene, const EmbreeModeName& name,

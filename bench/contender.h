@@ -41,6 +41,8 @@ struct Contender {
 
 /// The scene must outlive the contender.
 [[nodiscard]] Contender our_contender(const Scene& scene, const ModeName& name);
+/// A call for each ray, as renderers do that have one ray at a time.
+[[nodiscard]] Contender calling_contender(const Scene& scene);
 /// Keeps a copy of the scene. `tree` names how it was built, in the contender's name.
 [[nodiscard]] Contender embree_contender(const EmbreeScene& scene, const EmbreeModeName& name,
                                          std::string_view tree);

@@ -1,7 +1,6 @@
 #include "embree_reference.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
+#include "spread.h"
 
 #include <timing.h>
 
@@ -208,15 +207,9 @@ template <class Answer>
 void trace_all(RTCScene scene, EmbreeMode mode, std::span<const Ray> rays,
                std::span<Answer> answers, int threads) {
     if (rays.size() != answers.size()) throw std::invalid_argument("as many answers as rays");
-    if (threads == 1) return trace_some(scene, mode, rays, answers);
-    const std::size_t task_count = (rays.size() + kTaskSize - 1) / kTaskSize;
-    const auto trace_task = [&](std::size_t task) {
-        const std::size_t first = task * kTaskSize;
-        const std::size_t count = std::min(kTaskSize, rays.size() - first);
+    spread(rays.size(), kTaskSize, threads, [&](std::size_t first, std::size_t count) {
         trace_some(scene, mode, rays.subspan(first, count), answers.subspan(first, count));
-    };
-    tbb::task_arena(threads).execute(
-        [&] { tbb::parallel_for(std::size_t{0}, task_count, trace_task); });
+    });
 }
 
 RTCBuildQuality to_embree(EmbreeQuality quality) {

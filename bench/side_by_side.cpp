@@ -55,6 +55,7 @@ public:
             if (mode.mode == Mode::kTreelet) continue;  // for larger scenes: packet_large
             contenders_.push_back(our_contender(scene_, mode));
         }
+        contenders_.push_back(calling_contender(scene_));
         add_embree(EmbreeQuality::kMedium, "medium", test);
         add_embree(EmbreeQuality::kHigh, "high", test);
     }

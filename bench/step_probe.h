@@ -101,10 +101,10 @@ std::uint64_t packets_meet_triangles(const StepInput& in) {
 /// Calls step(ray) for every ray.
 template <class Isa, class Step>
 PACKET_INLINE void for_each_single(const StepInput& in, Step&& step) {
-    for (std::size_t i = 0; i < in.ray_count; i += kSingleLanes) {
-        PreparedLanes lanes;
-        prepare_lanes(in.tree, load_rays<kSingleLanes, Isa>(in.rays + i), lanes);
-        for (int lane = 0; lane < kSingleLanes; ++lane) step(SingleRay(lanes, lane));
+    for (std::size_t i = 0; i < in.ray_count; ++i) {
+        SingleRay ray;
+        prepare(ray, in.tree, RayAxes<Isa>(in.rays[i]));
+        step(ray);
     }
 }
 

@@ -1,5 +1,7 @@
 #include "configurations.h"
 
+#include "dispatch/dispatch.h"
+#include "scene/scene_accel.h"
 #include "share.h"
 
 #include <doctest/doctest.h>
@@ -101,6 +103,21 @@ static void check_configuration(const Scene& scene, std::span<const Ray> rays,
     CHECK(different == 0);
 }
 
+/// Rays by a call each, which takes kernels of its own.
+static void check_calls(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> want,
+                        IsaId isa) {
+    INFO("a call a ray, " << to_string(isa));
+    const KernelTable& kernels = select_kernels(isa);
+    std::vector<Hit> hits(rays.size());
+    std::size_t different = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        kernels.closest_ray(scene.accel().view, rays[i], hits[i]);
+        different += kernels.any_ray(scene.accel().view, rays[i]) != want[i].is_hit();
+    }
+    CHECK(count_differences(rays, want, hits) == 0);
+    CHECK(different == 0);
+}
+
 namespace {
 
 /// A share of the rays for each configuration, so that together the configurations trace all. It is
@@ -138,6 +155,11 @@ void check_agreement(Scene scene, std::span<const Ray> rays, const std::string& 
             const auto [first, count] = shares.next(configuration.threads);
             check_configuration(scene, rays.subspan(first, count),
                                 std::span(want).subspan(first, count), configuration);
+        }
+        for (const IsaId isa : cpu_isas()) {
+            const auto [first, count] = shares.next(1);
+            check_calls(scene, rays.subspan(first, count), std::span(want).subspan(first, count),
+                        isa);
         }
     }
 }

@@ -102,7 +102,7 @@ struct MarchCase {
     TreeView tree;
     RayLanes<1, Lane> ray;
     PreparedRays<1, Lane> prepared;
-    PreparedLanes lanes;
+    SingleRay single;
     float tfar;
 
     MarchCase(const GridSpace& space, const Ray& source) : tfar(source.tfar) {
@@ -117,7 +117,7 @@ struct MarchCase {
         grid.bricks.resize(space.brick_count(), {~std::uint64_t{0}, 0, 0});
         tree.grid = grid.view();
         prepare_boxes(prepared, tree, ray);
-        prepare_lanes(tree, broadcast(ray), lanes);
+        packet::prepare(single, tree, RayAxes<Lane>(source));
     }
 
     struct Interval {
@@ -136,7 +136,7 @@ struct MarchCase {
     /// Cells as the march meets them: places along x, y, z.
     [[nodiscard]] std::vector<std::tuple<int, int, int>> march_all() const {
         std::vector<std::tuple<int, int, int>> out;
-        const GridRay<Lane> way(tree.grid, SingleRay(lanes, 0), -INFINITY);
+        const GridRay<Lane> way(tree.grid, single, -INFINITY);
         NoCounters stats(nullptr);
         if (!(way.start <= tfar)) return out;
         march_grid(tree.grid, way, tfar, stats, [&](const GridBrick& brick, std::uint32_t bit) {

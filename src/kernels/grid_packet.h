@@ -138,8 +138,6 @@ template <Query query, int N, class Isa, class Stats>
                                        const Float<N, Isa>& from, std::uint32_t bits,
                                        std::int32_t instance_id, BestHits<N, Isa>& best,
                                        Stats& stats) {
-    PreparedLanes lanes[N / kSingleLanes];
-    prepare_lanes(tree, ray, lanes);
     float start[N], t[N], u[N], v[N];
     std::int32_t prim_id[N], instance[N], tie[N];
     from.store(start);
@@ -147,7 +145,8 @@ template <Query query, int N, class Isa, class Stats>
     best.prim_id.store(prim_id), best.instance_id.store(instance), best.tie_prim_id.store(tie);
     for (; bits != 0; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
-        const SingleRay one(lanes[i / kSingleLanes], i % kSingleLanes);
+        SingleRay one;
+        prepare(one, tree, RayAxes<Isa>(ray, i));
         BestHits<1, Isa> hit(t[i], Mask<1, Isa>::from_bits(1));
         hit.t = t[i], hit.u = u[i], hit.v = v[i];
         hit.prim_id = prim_id[i], hit.instance_id = instance[i], hit.tie_prim_id = tie[i];

@@ -20,9 +20,7 @@ struct GridRay {
 
     /// Starts at `from` or later.
     PACKET_INLINE GridRay(const GridView& grid, const SingleRay& ray, float from)
-        : start(ray.number(PreparedLanes::kTnear) > from ? ray.number(PreparedLanes::kTnear)
-                                                         : from) {
-        using L = PreparedLanes;
+        : start(ray.tnear > from ? ray.tnear : from) {
         std::int32_t step = 1;
         for (int a = 0; a < 3; ++a) {
             const int count = grid.brick_count[a];
@@ -30,9 +28,9 @@ struct GridRay {
             bricks[a] = {negative ? grid.planes[a] + count * kBrickSide : grid.planes[a],
                          negative ? -kBrickSide : kBrickSide,
                          count,
-                         ray.number((negative ? L::kUpperOrg : L::kLowerOrg) + a),
-                         ray.number((negative ? L::kLowerOrg : L::kUpperOrg) + a),
-                         ray.number(L::kReciprocal + a)};
+                         ray.box_org[negative ? 1 : 0][a],
+                         ray.box_org[negative ? 0 : 1][a],
+                         ray.reciprocal[a]};
             first_brick += negative ? (count - 1) * step : 0;
             brick_step[a] = negative ? -step : step;
             flipped |= negative ? 3u << 2 * a : 0u;
@@ -41,8 +39,7 @@ struct GridRay {
             start = enter > start ? enter : start;
         }
         for (int a = 0; a < 3; ++a) {
-            const float at_start =
-                ray.number(L::kLowerOrg + a) + start / ray.number(L::kReciprocal + a);
+            const float at_start = ray.box_org[0][a] + start / ray.reciprocal[a];
             const float way = __builtin_fabsf(at_start - bricks[a].planes[0]);
             const float last = static_cast<float>(bricks[a].count - 1);
             const float at = way * grid.bricks_per_unit[a];

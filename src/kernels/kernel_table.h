@@ -67,6 +67,9 @@ struct TreeletBatch {
 struct KernelTable {
     using Batch = void (*)(const TraceBatch&) noexcept;
     using Treelet = void (*)(const TreeletBatch&) noexcept;
+    /// `hit` is a miss, and stays one if nothing is hit.
+    using ClosestRay = void (*)(const SceneView&, const Ray&, Hit& hit) noexcept;
+    using AnyRay = bool (*)(const SceneView&, const Ray&) noexcept;
     template <int N>
     using Closest = void (*)(const SceneView&, const RayPacket<N>&, std::uint32_t active,
                              HitPacket<N>&) noexcept;
@@ -91,6 +94,8 @@ struct KernelTable {
     Treelet closest_treelet[kCountingCount];
     Treelet any_treelet[kCountingCount];
     StreamKeys stream_keys;
+    ClosestRay closest_ray;
+    AnyRay any_ray;
     Closest<8> closest8;
     Closest<16> closest16;
     Any<8> any8;

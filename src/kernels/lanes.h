@@ -198,6 +198,48 @@ PACKET_INLINE Int<N, Isa> pick(const std::int32_t* eight, const Int<N, Isa>& whi
     return out;
 }
 
+/// Three numbers of one ray, one an axis. The fourth lane is of no account.
+template <class Isa>
+using Axes = Float<4, Isa>;
+
+template <class Isa>
+PACKET_INLINE Axes<Isa> axes(float x, float y, float z) {
+    Axes<Isa> out;
+    if constexpr (Axes<Isa>::kCount == 1) {
+        out.r[0] = Axes<Isa>::Reg::set(x, y, z, 0.0f);
+    } else {
+        out.r[0] = x, out.r[1] = y, out.r[2] = z, out.r[3] = 0.0f;
+    }
+    return out;
+}
+/// Which axes come first, second and third.
+template <int i0, int i1, int i2, class Isa>
+PACKET_INLINE Axes<Isa> permute(const Axes<Isa>& a) {
+    Axes<Isa> out;
+    if constexpr (Axes<Isa>::kCount == 1) {
+        out.r[0] = Axes<Isa>::Reg::template permute<i0, i1, i2>(a.r[0]);
+    } else {
+        out.r[0] = a.r[i0], out.r[1] = a.r[i1], out.r[2] = a.r[i2], out.r[3] = a.r[3];
+    }
+    return out;
+}
+template <class Isa>
+PACKET_INLINE Axes<Isa> permute(const Axes<Isa>& a, const AxisOrder& order) {
+    Axes<Isa> out;
+    if constexpr (Axes<Isa>::kCount == 1) {
+        out.r[0] = Axes<Isa>::Reg::permute(a.r[0], order);
+    } else {
+        for (int i = 0; i < 3; ++i) out.r[i] = a.r[order.axis[i]];
+        out.r[3] = a.r[3];
+    }
+    return out;
+}
+/// Of the three, which hold.
+template <class Isa>
+PACKET_INLINE std::uint32_t axis_bits(Mask<4, Isa> m) {
+    return m.bits() & 7;
+}
+
 /// Lanes of packets that may have as many as suit the CPU: those of its widest register.
 template <class Isa>
 inline constexpr int kPacketLanes = 8;

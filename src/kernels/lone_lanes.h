@@ -23,7 +23,7 @@ public:
         for (std::uint32_t left = active.bits(); left != 0; left &= left - 1) {
             const int lane = __builtin_ctz(left);
             if (query == Query::kAny && best_t_[lane] == kNever) continue;
-            const auto alone = ray_of_(lane);
+            const auto& alone = ray_of_(lane);
             walk_wide_tree<query, Isa>(
                 tree_, alone, best_t_[lane], stats,
                 [&](std::uint32_t first, std::uint32_t item_count) {

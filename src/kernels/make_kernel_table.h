@@ -32,6 +32,8 @@ constexpr KernelTable make_kernel_table() {
     table.any_treelet[KT::kNotCounting] = run_treelet<Query::kAny, Isa, NoCounters>;
     table.any_treelet[KT::kCounting] = run_treelet<Query::kAny, Isa, Counters>;
     table.stream_keys = find_stream_keys<Isa>;
+    table.closest_ray = closest_ray<Isa>;
+    table.any_ray = any_ray<Isa>;
     table.closest8 = closest_packet<8, Isa>;
     table.closest16 = closest_packet<16, Isa>;
     table.any8 = any_packet<8, Isa>;

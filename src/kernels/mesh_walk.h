@@ -62,10 +62,12 @@ private:
         }
     };
     PACKET_INLINE void walk_alone(const WideChild& child, Mask<N, Isa> active) {
-        if (!are_prepared_) prepare_lanes<N, Isa>(tree_, ray_, lanes_);
-        are_prepared_ = true;
-        const auto ray_of = [&](int lane) {
-            return SingleRay(lanes_[lane / kSingleLanes], lane % kSingleLanes);
+        const auto ray_of = [&](int lane) -> const SingleRay& {
+            if ((prepared_lanes_ >> lane & 1) == 0) {
+                prepare(lanes_[lane], tree_, RayAxes<Isa>(ray_, lane));
+                prepared_lanes_ |= 1u << lane;
+            }
+            return lanes_[lane];
         };
         LoneLanes<query, N, Isa, decltype(ray_of)> lanes(tree_, ray_of, instance_id_, best_);
         lanes.walk(child, active, stats_);
@@ -77,8 +79,8 @@ private:
     std::int32_t instance_id_;
     BestHits<N, Isa>& best_;
     Stats& stats_;
-    bool are_prepared_ = false;  ///< lanes_
-    PreparedLanes lanes_[N / kSingleLanes];
+    std::uint32_t prepared_lanes_ = 0;  ///< of lanes_
+    SingleRay lanes_[N];
 };
 
 }  // namespace packet

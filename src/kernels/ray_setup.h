@@ -16,6 +16,9 @@ namespace packet {
 enum class Directions { kShared, kMixed };
 
 inline constexpr float kLargestFloat = 3.402823466e38f;
+inline constexpr float kSmallestNormal = 1.175494351e-38f;
+/// A ray is steep if a reciprocal is more than so many times that of its longest axis.
+inline constexpr float kSteepest = 0x1p32f;
 
 /// Rays as they come in. Lanes that take no part hold a ray that hits nothing.
 template <int N, class Isa>
@@ -102,7 +105,6 @@ PACKET_INLINE Float<N, Isa> safe_reciprocal(const Float<N, Isa>& x) {
 template <int N, class Isa>
 PACKET_INLINE Mask<N, Isa> usable(const RayLanes<N, Isa>& ray) {
     using F = Float<N, Isa>;
-    constexpr float kSmallestNormal = 1.175494351e-38f;
     const F zero(0.0f);
     // NaN where a number is not finite, as 0 times it is; else 0, fused or not
     F nothing(0.0f);
@@ -193,7 +195,6 @@ template <int N, class Isa>
 PACKET_INLINE void prepare_nodes(PreparedRays<N, Isa>& out, const RayLanes<N, Isa>& ray,
                                  const Float<N, Isa>& growth) {
     using F = Float<N, Isa>;
-    constexpr float kSteepest = 0x1p32f;
     F least, most, farthest, more[3];
     for (int a = 0; a < 3; ++a) {
         const F size = abs(out.hit.reciprocal[a]), distance = abs(ray.org[a]);

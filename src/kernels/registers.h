@@ -14,6 +14,12 @@
 
 namespace packet {
 
+/// Which of three numbers come first, second and third, and the bytes of a register that they are.
+struct AxisOrder {
+    alignas(16) std::uint8_t bytes[16];
+    std::int32_t axis[4];  ///< the fourth number stays where it is
+};
+
 /// Registers of one lane, for any CPU. Written out, since this is what "the same bits" is held to.
 template <class Isa>
 struct ScalarRegister {
@@ -167,6 +173,20 @@ struct XsimdRegister {
     PACKET_INLINE static I pick(const std::int32_t* eight, I which) {
         return I(pick_lanes(eight, which.data));
     }
+    PACKET_INLINE static F set(float a, float b, float c, float d) {
+        static_assert(kWidth == 4);
+        return F(_mm_setr_ps(a, b, c, d));
+    }
+    template <int i0, int i1, int i2>
+    PACKET_INLINE static F permute(F a) {
+        static_assert(kWidth == 4);
+        return F(_mm_shuffle_ps(a.data, a.data, i0 | i1 << 2 | i2 << 4 | 3 << 6));
+    }
+    PACKET_INLINE static F permute(F a, const AxisOrder& order) {
+        static_assert(kWidth == 4);
+        const auto bytes = _mm_load_si128(reinterpret_cast<const __m128i*>(order.bytes));
+        return F(_mm_castsi128_ps(_mm_shuffle_epi8(_mm_castps_si128(a.data), bytes)));
+    }
     PACKET_INLINE static std::uint32_t bits(M m) { return mask_bits(m.data); }
 
     PACKET_INLINE static M from_bits(std::uint32_t bits) {
@@ -244,12 +264,20 @@ requires(N >= 4) struct RegisterFor<isa::Sse42, N> {
 };
 #endif
 #if defined(__AVX2__)
+template <>
+struct RegisterFor<isa::Avx2, 4> {
+    using Type = XsimdRegister<xsimd::sse4_2>;
+};
 template <int N>
 requires(N >= 8) struct RegisterFor<isa::Avx2, N> {
     using Type = XsimdRegister<xsimd::fma3<xsimd::avx2>>;
 };
 #endif
 #if defined(__AVX512F__)
+template <>
+struct RegisterFor<isa::Avx512, 4> {
+    using Type = XsimdRegister<xsimd::sse4_2>;
+};
 template <>
 struct RegisterFor<isa::Avx512, 8> {
     using Type = Avx512HalfRegister;

@@ -1,130 +1,170 @@
-// Single rays, prepared eight at a time: the arithmetic is that of a packet, and each ray is then
-// picked out of memory by broadcasts, which cost no more than any load.
+// Single rays. What they need lies in memory, and each number is put into all lanes where it is
+// used, by broadcasts that cost no more than any load. They are prepared with an axis a lane, which
+// takes a third of the steps; the arithmetic that decides about hits is that of packets
+// (ray_setup.h).
 #pragma once
 
 #include "kernels/ray_setup.h"
 
 namespace packet {
 
-/// Rays are prepared this many at a time.
-inline constexpr int kSingleLanes = 8;
+/// A ray as it comes in, an axis a lane.
+template <class Isa>
+struct RayAxes {
+    Axes<Isa> org, dir;
+    float tnear, tfar;
 
-/// What PreparedRays holds, in memory: a row holds a number of all rays, a column all numbers of a
-/// ray, so these lie at fixed distances from each other.
-struct PreparedLanes {
-    enum Number {  // those of which there are three: one an axis
-        kTnear,
-        kInvDir,                   ///< for nodes, as the next two
-        kNearShift = kInvDir + 3,  ///< for the planes that are met first
-        kFarOrg = kNearShift + 3,  ///< of ExitOrigins
-        kShearOrg = kFarOrg + 3,   ///< in the order of the ray's axes
-        kShearX = kShearOrg + 3,
-        kShearY,
-        kScaleZ,
-        kLowerOrg,  ///< for triangles' boxes, as the next two
-        kUpperOrg = kLowerOrg + 3,
-        kReciprocal = kUpperOrg + 3,
-        kNumbers = kReciprocal + 3
-    };
-    enum Index {
-        kNearPlanes,  ///< where in WideNode::plane those are that are met first
-        kFarPlanes = kNearPlanes + 3,
-        kAxis = kFarPlanes + 3,  ///< those that become x, y, z
-        kIndices = kAxis + 3
-    };
-    alignas(64) float number[kNumbers][kSingleLanes];
-    std::int32_t index[kIndices][kSingleLanes];
+    PACKET_INLINE explicit RayAxes(const Ray& ray)
+        : tnear(ray.tnear < -kLargestFloat ? -kLargestFloat : ray.tnear), tfar(ray.tfar) {
+        static_assert(sizeof(Ray) == 8 * sizeof(float));
+        const auto* numbers = reinterpret_cast<const float*>(&ray);
+        org = Axes<Isa>::load(numbers), dir = Axes<Isa>::load(numbers + 4);
+    }
+    template <int N>
+    PACKET_INLINE RayAxes(const RayLanes<N, Isa>& rays, int lane)
+        : org(axes<Isa>(lane_of(rays.org[0], lane), lane_of(rays.org[1], lane),
+                        lane_of(rays.org[2], lane))),
+          dir(axes<Isa>(lane_of(rays.dir[0], lane), lane_of(rays.dir[1], lane),
+                        lane_of(rays.dir[2], lane))),
+          tnear(lane_of(rays.tnear, lane)),
+          tfar(lane_of(rays.tfar, lane)) {}
 };
 
+/// As for the lanes of a packet.
 template <class Isa>
-PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<kSingleLanes, Isa>& ray,
-                                 PreparedLanes& out) {
-    using F = Float<kSingleLanes, Isa>;
-    using I = Int<kSingleLanes, Isa>;
-    using L = PreparedLanes;
-    PreparedRays<kSingleLanes, Isa> from;
-    prepare_boxes(from, tree, ray);
-    prepare_shear(from, ray);
-    const Float3<kSingleLanes, Isa> shear_org = rotate_axes(from.shear, ray.org);
-    const ExitOrigins<kSingleLanes, Isa> exits(from, tree, ray);
-    from.hit.tnear.store(out.number[L::kTnear]);
-    shear_org.x.store(out.number[L::kShearOrg]);
-    shear_org.y.store(out.number[L::kShearOrg + 1]);
-    shear_org.z.store(out.number[L::kShearOrg + 2]);
-    from.shear.shear_x.store(out.number[L::kShearX]);
-    from.shear.shear_y.store(out.number[L::kShearY]);
-    from.hit.scale_z.store(out.number[L::kScaleZ]);
-    for (int a = 0; a < 3; ++a) {
-        const auto backward = from.hit.reciprocal[a] < F(0.0f);
-        const F &lower = from.shift[0][a], &upper = from.shift[1][a];
-        from.inv_dir[a].store(out.number[L::kInvDir + a]);
-        select(backward, upper, lower).store(out.number[L::kNearShift + a]);
-        select(backward, exits.org[0][a], exits.org[1][a]).store(out.number[L::kFarOrg + a]);
-        from.hit.org[0][a].store(out.number[L::kLowerOrg + a]);
-        from.hit.org[1][a].store(out.number[L::kUpperOrg + a]);
-        from.hit.reciprocal[a].store(out.number[L::kReciprocal + a]);
-
-        const I lower_planes(a * kWideSize), upper_planes((3 + a) * kWideSize);
-        select(backward, upper_planes, lower_planes).store(out.index[L::kNearPlanes + a]);
-        select(backward, lower_planes, upper_planes).store(out.index[L::kFarPlanes + a]);
-        // x: y z x, y: z x y, z: x y z
-        select(from.shear.z_is_x, I((a + 1) % 3), select(from.shear.z_is_y, I((a + 2) % 3), I(a)))
-            .store(out.index[L::kAxis + a]);
-    }
+PACKET_INLINE bool usable(const RayAxes<Isa>& ray) {
+    using F = Axes<Isa>;
+    const F zero(0.0f);
+    const F nothing = ray.org * zero + ray.dir * zero;  // NaN where a number is not finite
+    return axis_bits(nothing == zero) == 7 && axis_bits(abs(ray.dir) >= F(kSmallestNormal)) != 0 &&
+           ray.tnear <= ray.tfar;
 }
 
-/// The lanes of a packet, some at a time.
-template <int N, class Isa>
-PACKET_INLINE void prepare_lanes(const TreeView& tree, const RayLanes<N, Isa>& ray,
-                                 PreparedLanes (&out)[N / kSingleLanes]) {
-    using Some = Float<kSingleLanes, Isa>;
-    float org[3][N], dir[3][N], tnear[N], tfar[N];
-    for (int a = 0; a < 3; ++a) ray.org[a].store(org[a]), ray.dir[a].store(dir[a]);
-    ray.tnear.store(tnear), ray.tfar.store(tfar);
-    for (int first = 0; first < N; first += kSingleLanes) {
-        RayLanes<kSingleLanes, Isa> some;
-        for (int a = 0; a < 3; ++a) {
-            some.org[a] = Some::load(org[a] + first);
-            some.dir[a] = Some::load(dir[a] + first);
-        }
-        some.tnear = Some::load(tnear + first), some.tfar = Some::load(tfar + first);
-        prepare_lanes(tree, some, out[first / kSingleLanes]);
-    }
-}
-
-/// One ray in all lanes.
+/// As for the lanes of a packet: rounded in the same order.
 template <class Isa>
-PACKET_INLINE RayLanes<kSingleLanes, Isa> broadcast(const RayLanes<1, Isa>& ray) {
-    RayLanes<kSingleLanes, Isa> out;
-    for (int a = 0; a < 3; ++a) {
-        out.org[a] = ray.org[a].r[0];
-        out.dir[a] = ray.dir[a].r[0];
-    }
-    out.tnear = ray.tnear.r[0];
-    out.tfar = ray.tfar.r[0];
+PACKET_INLINE RayAxes<Isa> to_object(const InstanceView& instance, const RayAxes<Isa>& world) {
+    using F = Axes<Isa>;
+    const auto& m = instance.object_from_world;
+    F column[4];
+    for (int c = 0; c < 4; ++c) column[c] = axes<Isa>(m[0][c], m[1][c], m[2][c]);
+    const auto turn = [&](const F& v) {
+        return column[0] * permute<0, 0, 0>(v) + column[1] * permute<1, 1, 1>(v) +
+               column[2] * permute<2, 2, 2>(v);
+    };
+    RayAxes<Isa> out = world;
+    out.dir = turn(world.dir);
+    out.org = turn(world.org) + column[3];
     return out;
 }
 
-/// One of the rays.
-class SingleRay {
-public:
-    PACKET_INLINE SingleRay(const PreparedLanes& from, int lane)
-        : numbers_(from.number[0] + lane), indices_(from.index[0] + lane) {}
+/// A ray prepared for the boxes and triangles of one tree. Of four numbers the first three are
+/// those of the axes.
+struct SingleRay {
+    /// For nodes: t = plane * inv_dir - near_shift for the planes that are met first, and for the
+    /// others (plane - far_org) * inv_dir, by which a ray leaves no later than boxes of the
+    /// contract's form, so that it leaves behind the surface that it starts next to.
+    alignas(16) float inv_dir[4];
+    alignas(16) float near_shift[4];
+    alignas(16) float far_org[4];
+    /// For triangles: the shear that turns the ray into the z axis, axes in its order.
+    alignas(16) float shear_org[4];
+    alignas(16) float shear[4];  ///< x, y
+    /// For triangles' boxes, by the contract's form.
+    alignas(16) float box_org[2][4];
+    alignas(16) float reciprocal[4];
+    /// Where in WideNode::plane those are that are met first, and the others.
+    alignas(16) std::int32_t near_planes[4];
+    alignas(16) std::int32_t far_planes[4];
+    alignas(16) std::int32_t axis[4];  ///< those that become x, y, z
+    float scale_z, tnear;
 
-    PACKET_INLINE const float& number(int which) const {
-        return numbers_[std::ptrdiff_t{which} * kSingleLanes];
+    [[nodiscard]] PACKET_INLINE bool is_backward(int a) const {
+        return near_planes[a] != a * kWideSize;
     }
-    PACKET_INLINE std::int32_t index(int which) const {
-        return indices_[std::ptrdiff_t{which} * kSingleLanes];
-    }
-    PACKET_INLINE bool is_backward(int axis) const {
-        return index(PreparedLanes::kNearPlanes + axis) != axis * kWideSize;
-    }
-
-private:
-    const float* numbers_;
-    const std::int32_t* indices_;
 };
+
+/// The orders of axes in which x, y or z comes last, as the bytes of three floats and of what comes
+/// after them.
+template <class Isa>
+inline constexpr AxisOrder kLongestLast[3] = {
+    {{4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 12, 13, 14, 15}, {1, 2, 0, 3}},
+    {{8, 9, 10, 11, 0, 1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15}, {2, 0, 1, 3}},
+    {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}, {0, 1, 2, 3}}};
+
+/// The first of the longest axes.
+template <class Isa>
+PACKET_INLINE int longest_axis(const Axes<Isa>& dir) {
+    const Axes<Isa> length = abs(dir);
+    // x >= y, y >= z, x >= z
+    const std::uint32_t bits = axis_bits(permute<0, 1, 0>(length) >= permute<1, 2, 2>(length));
+    // By these bits, two for each: x if it is neither less than y nor than z, else the greater.
+    constexpr std::uint32_t kAxisByBits = 0x129a;
+    return static_cast<int>(kAxisByBits >> 2 * bits & 3);
+}
+
+/// What nodes need of a steep ray, as lanes that are prepared by themselves have it.
+template <class Isa>
+PACKET_NOINLINE void prepare_steep_ray(SingleRay& out, const TreeView& tree,
+                                       const RayAxes<Isa>& axes) {
+    RayLanes<1, Isa> ray;
+    float org[4], dir[4];
+    axes.org.store(org), axes.dir.store(dir);
+    for (int a = 0; a < 3; ++a) ray.org[a] = org[a], ray.dir[a] = dir[a];
+    ray.tnear = axes.tnear, ray.tfar = axes.tfar;
+    PreparedRays<1, Isa> from;
+    prepare_boxes(from, tree, ray);
+    const ExitOrigins<1, Isa> exits(from, tree, ray);
+    for (int a = 0; a < 3; ++a) {
+        const int near_side = out.is_backward(a) ? 1 : 0;
+        out.inv_dir[a] = from.inv_dir[a].r[0];
+        out.near_shift[a] = from.shift[near_side][a].r[0];
+        out.far_org[a] = exits.org[1 - near_side][a].r[0];
+    }
+}
+
+template <class Isa>
+PACKET_INLINE void prepare(SingleRay& out, const TreeView& tree, const RayAxes<Isa>& ray) {
+    using F = Axes<Isa>;
+    using I = Int<4, Isa>;
+    const F zero(0.0f);
+    // by how much boxes are grown: as box_growth(), prepare_hits() and node_growth()
+    const F far = max(ray.org - F::load(tree.lower), F::load(tree.upper) - ray.org);
+    const F reach =
+        max(zero, max(max(permute<0, 0, 0>(far), permute<1, 1, 1>(far)), permute<2, 2, 2>(far)));
+    const F growth = (reach + F(tree.reach)) * F(tree.slack), distance = abs(ray.org);
+    const F box_growth = growth + distance * F(kOriginSlack);
+    const F node_growth = growth + growth + distance * F(4.0f * kOriginSlack);
+    const F lower_org = ray.org + box_growth, upper_org = ray.org - box_growth;
+    const F reciprocal = safe_reciprocal(ray.dir);
+    lower_org.store(out.box_org[0]), upper_org.store(out.box_org[1]);
+    reciprocal.store(out.reciprocal);
+
+    const AxisOrder& order = kLongestLast<Isa>[longest_axis(ray.dir)];
+    const F dir = permute(ray.dir, order);
+    permute(ray.org, order).store(out.shear_org);
+    (dir / permute<2, 2, 2>(dir)).store(out.shear);
+    const F scale_z = permute<2, 2, 2>(permute(reciprocal, order));
+    out.scale_z = lane_of(scale_z, 0);
+    I::load(order.axis).store(out.axis);
+    out.tnear = ray.tnear;
+
+    constexpr std::int32_t kLower[4] = {0, kWideSize, 2 * kWideSize, 0};
+    constexpr std::int32_t kUpper[4] = {3 * kWideSize, 4 * kWideSize, 5 * kWideSize, 0};
+    const auto backward = reciprocal < zero;
+    const F lower = (ray.org + node_growth) * reciprocal;
+    const F upper = (ray.org - node_growth) * reciprocal;
+    reciprocal.store(out.inv_dir);
+    select(backward, upper, lower).store(out.near_shift);
+    select(backward, lower_org, upper_org).store(out.far_org);
+    select(backward, I::load(kUpper), I::load(kLower)).store(out.near_planes);
+    select(backward, I::load(kLower), I::load(kUpper)).store(out.far_planes);
+    // as prepare_nodes() has it
+    const F limit = min(F(kLargestFloat), abs(scale_z) * F(kSteepest));
+    const auto is_plain =
+        (abs(reciprocal) <= limit) & (max(abs(lower), abs(upper)) <= F(kLargestFloat));
+    if (axis_bits(is_plain) != 7) [[unlikely]]
+        prepare_steep_ray(out, tree, ray);
+}
 
 /// One of the rays of a packet that share their directions, as far as triangles need it.
 template <int N, class Isa>
@@ -152,14 +192,13 @@ PACKET_INLINE ShearRays<N, Isa> shear_of(const PacketRay<M, Isa>& ray) {
 }
 template <int N, class Isa>
 PACKET_INLINE ShearRays<N, Isa> shear_of(const SingleRay& ray) {
-    using L = PreparedLanes;
     ShearRays<N, Isa> out;
     for (int a = 0; a < 3; ++a) {
-        out.org[a] = ray.number(L::kShearOrg + a);
-        out.axis[a] = ray.index(L::kAxis + a);
+        out.org[a] = ray.shear_org[a];
+        out.axis[a] = ray.axis[a];
     }
-    out.shear_x = ray.number(L::kShearX);
-    out.shear_y = ray.number(L::kShearY);
+    out.shear_x = ray.shear[0];
+    out.shear_y = ray.shear[1];
     return out;
 }
 
@@ -184,12 +223,11 @@ struct SingleHitRay {
         }
     }
     PACKET_INLINE explicit SingleHitRay(const SingleRay& ray)
-        : tnear{&ray.number(PreparedLanes::kTnear)}, scale_z{&ray.number(PreparedLanes::kScaleZ)} {
-        using L = PreparedLanes;
+        : tnear{&ray.tnear}, scale_z{&ray.scale_z} {
         for (int a = 0; a < 3; ++a) {
-            org[0][a].number = &ray.number(L::kLowerOrg + a);
-            org[1][a].number = &ray.number(L::kUpperOrg + a);
-            reciprocal[a].number = &ray.number(L::kReciprocal + a);
+            org[0][a].number = &ray.box_org[0][a];
+            org[1][a].number = &ray.box_org[1][a];
+            reciprocal[a].number = &ray.reciprocal[a];
         }
     }
 };

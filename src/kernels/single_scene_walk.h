@@ -7,87 +7,57 @@
 
 namespace packet {
 
-/// The rays of `active` meet the mesh, one by one; `best` has a place for each of the lanes.
+/// The ray meets a mesh.
 template <Query query, class Isa, class Stats>
-[[gnu::noinline]] void walk_mesh(const TreeView& tree, const PreparedLanes& lanes,
-                                 std::uint32_t active, std::int32_t instance_id,
-                                 BestHits<1, Isa>* best, Stats& stats) {
-    for (; active != 0; active &= active - 1) {
-        const int i = __builtin_ctz(active);
-        const SingleRay ray(lanes, i);
-        best[i].enter_instance(instance_id);
-        if (tree.grid.bricks != nullptr) {
-            walk_grid<query>(tree, ray, kNever, instance_id, best[i], stats);
-            continue;
-        }
-        const SingleLeaf<query, Isa> leaf{tree, ray, instance_id, best[i]};
-        walk_wide_tree<query, Isa>(tree, ray, best[i].t.r[0], stats,
-                                   [&](std::uint32_t first, std::uint32_t item_count) {
-                                       stats.triangles(static_cast<int>(item_count));
-                                       leaf.meet(BlockRange{first, item_count});
-                                   });
+[[gnu::noinline]] void walk_mesh(const TreeView& tree, const SingleRay& ray,
+                                 std::int32_t instance_id, BestHits<1, Isa>& best, Stats& stats) {
+    best.enter_instance(instance_id);
+    if (tree.grid.bricks != nullptr) {
+        walk_grid<query>(tree, ray, kNever, instance_id, best, stats);
+        return;
     }
+    const SingleLeaf<query, Isa> leaf{tree, ray, instance_id, best};
+    walk_wide_tree<query, Isa>(tree, ray, best.t.r[0], stats,
+                               [&](std::uint32_t first, std::uint32_t item_count) {
+                                   stats.triangles(static_cast<int>(item_count));
+                                   leaf.meet(BlockRange{first, item_count});
+                               });
 }
 
 /// The ray meets the instances of a leaf of the top tree.
 template <Query query, class Isa, class Stats>
-PACKET_INLINE void meet_instances(const SceneView& scene, const RayLanes<1, Isa>& ray,
+PACKET_INLINE void meet_instances(const SceneView& scene, const RayAxes<Isa>& world,
                                   std::uint32_t first, std::uint32_t item_count,
                                   BestHits<1, Isa>& best, Stats& stats) {
     for (std::uint32_t i = first; i < first + item_count && best.t.r[0] != kNever; ++i) {
         const InstanceView& instance = scene.instances[i];
-        const RayLanes<1, Isa> moved = to_object(instance, ray);
-        if (instance.tree->is_empty() || none(usable(moved))) continue;
-        PreparedLanes lanes;
-        prepare_lanes(*instance.tree, broadcast(moved), lanes);
-        walk_mesh<query>(*instance.tree, lanes, 1, static_cast<std::int32_t>(instance.instance_id),
-                         &best, stats);
+        const RayAxes<Isa> moved = to_object(instance, world);
+        if (instance.tree->is_empty() || !usable(moved)) continue;
+        SingleRay ray;
+        prepare(ray, *instance.tree, moved);
+        walk_mesh<query>(*instance.tree, ray, static_cast<std::int32_t>(instance.instance_id), best,
+                         stats);
     }
 }
 
-/// Lanes of rays in memory, to pick single ones from.
-struct StoredRays {
-    float org[3][kSingleLanes], dir[3][kSingleLanes], tnear[kSingleLanes], tfar[kSingleLanes];
+/// The tree that rays meet first.
+PACKET_INLINE const TreeView& first_tree(const SceneView& scene) {
+    return scene.is_single_mesh ? *scene.instances[0].tree : scene.top;
+}
 
-    template <class Isa>
-    PACKET_INLINE explicit StoredRays(const RayLanes<kSingleLanes, Isa>& ray) {
-        for (int a = 0; a < 3; ++a) ray.org[a].store(org[a]), ray.dir[a].store(dir[a]);
-        ray.tnear.store(tnear), ray.tfar.store(tfar);
-    }
-    template <class Isa>
-    PACKET_INLINE RayLanes<1, Isa> lane(int i) const {
-        return {{org[0][i], org[1][i], org[2][i]},
-                {dir[0][i], dir[1][i], dir[2][i]},
-                tnear[i],
-                tfar[i]};
-    }
-};
-
-/// The rays of `active`, which are usable, walk the scene one by one; `best` has a place for each
-/// of the lanes.
+/// A ray, which is usable and prepared for the scene's first tree, walks the scene.
 template <Query query, class Isa, class Stats>
-PACKET_INLINE void walk_scene_singly(const SceneView& scene,
-                                     const RayLanes<kSingleLanes, Isa>& rays, std::uint32_t active,
-                                     BestHits<1, Isa>* best, Stats& stats) {
-    const TreeView& tree = scene.is_single_mesh ? *scene.instances[0].tree : scene.top;
-    if (tree.is_empty()) return;
-    PreparedLanes lanes;
-    prepare_lanes(tree, rays, lanes);
+PACKET_INLINE void walk_scene_singly(const SceneView& scene, const RayAxes<Isa>& world,
+                                     const SingleRay& ray, BestHits<1, Isa>& best, Stats& stats) {
     if (scene.is_single_mesh) {
-        walk_mesh<query>(tree, lanes, active,
+        walk_mesh<query>(*scene.instances[0].tree, ray,
                          static_cast<std::int32_t>(scene.instances[0].instance_id), best, stats);
         return;
     }
-    const StoredRays stored(rays);
-    for (; active != 0; active &= active - 1) {
-        const int i = __builtin_ctz(active);
-        const RayLanes<1, Isa> world = stored.lane<Isa>(i);
-        walk_wide_tree<query, Isa>(tree, SingleRay(lanes, i), best[i].t.r[0], stats,
-                                   [&](std::uint32_t first, std::uint32_t item_count) {
-                                       meet_instances<query>(scene, world, first, item_count,
-                                                             best[i], stats);
-                                   });
-    }
+    walk_wide_tree<query, Isa>(
+        scene.top, ray, best.t.r[0], stats, [&](std::uint32_t first, std::uint32_t item_count) {
+            meet_instances<query>(scene, world, first, item_count, best, stats);
+        });
 }
 
 }  // namespace packet

@@ -22,14 +22,14 @@ class WideRay {
 public:
     using F = Float<kWideSize, Isa>;
 
-    PACKET_INLINE explicit WideRay(const SingleRay& ray) : tnear_(ray.number(L::kTnear)) {
+    PACKET_INLINE explicit WideRay(const SingleRay& ray) : tnear_(ray.tnear) {
         static_assert(exits == Exits::kContract);
         for (int a = 0; a < 3; ++a) {
-            inv_dir_[a] = ray.number(L::kInvDir + a);
-            near_shift_[a] = ray.number(L::kNearShift + a);
-            far_[a] = ray.number(L::kFarOrg + a);
-            near_planes_[a] = ray.index(L::kNearPlanes + a);
-            far_planes_[a] = ray.index(L::kFarPlanes + a);
+            inv_dir_[a] = ray.inv_dir[a];
+            near_shift_[a] = ray.near_shift[a];
+            far_[a] = ray.far_org[a];
+            near_planes_[a] = ray.near_planes[a];
+            far_planes_[a] = ray.far_planes[a];
         }
     }
     template <int N>
@@ -66,8 +66,6 @@ public:
     }
 
 private:
-    using L = PreparedLanes;
-
     F inv_dir_[3], near_shift_[3], tnear_;
     F far_[3];  ///< the origin that the ray leaves boxes by, or the shift
     std::ptrdiff_t near_planes_[3], far_planes_[3];

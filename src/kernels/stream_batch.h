@@ -65,7 +65,7 @@ private:
         const std::size_t left = batch_.count - next_;
         const int most = left < kStreamRays ? static_cast<int>(left) : kStreamRays;
         const RayColumns columns = gather_rays(batch_, next_, most, gathered_);
-        turn.count = class_run<kSingleLanes, Isa>(columns.component + 4, most);
+        turn.count = class_run<8, Isa>(columns.component + 4, most);
         next_ += static_cast<std::size_t>(turn.count);
         prefetch_rays(batch_, next_, kStreamRays);
         load_stream<query>(turn.stream, tree_, instance_id_, columns, turn.count);

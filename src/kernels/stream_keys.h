@@ -46,7 +46,7 @@ PACKET_INLINE Int<N, Isa> place_bits(const Float<N, Isa> (&org)[3], const Origin
 template <class Isa>
 void find_stream_keys(const Ray* rays, std::size_t count, const OriginCells& cells,
                       std::uint32_t* keys) noexcept {
-    constexpr int N = kSingleLanes;
+    constexpr int N = 8;
     constexpr std::size_t kAhead = 256;  // rays
     using F = Float<N, Isa>;
     const TraceBatch batch{nullptr, rays, nullptr, count, nullptr, nullptr, nullptr};

@@ -60,20 +60,6 @@ PACKET_INLINE void trace_packet(const SceneView& scene, const RayColumns& rays, 
     store_hits(best, out, first);
 }
 
-/// The eight rays from `first` on.
-template <Query query, class Isa, int kCount, class Stats>
-PACKET_INLINE void trace_singly(const SceneView& scene, const RayColumns& rays, std::uint32_t asked,
-                                Stats& stats, HitArrays<kCount, Isa>& out, int first) {
-    const LoadedRays<kSingleLanes, Isa> loaded(rays.from(first), asked);
-    const std::uint32_t active = loaded.active.bits();
-    float tfar[kSingleLanes];
-    loaded.ray.tfar.store(tfar);
-    BestHits<1, Isa> best[kSingleLanes];
-    for (int i = 0; i < kSingleLanes; ++i) best[i].reset(tfar[i], Mask<1, Isa>::from_bits(1));
-    if (active != 0) walk_scene_singly<query>(scene, loaded.ray, active, best, stats);
-    for (int i = 0; i < kSingleLanes; ++i) store_hits(best[i], out, first + i);
-}
-
 /// The lanes of N that are among the first `count`, counted from lane `first`.
 template <int N>
 PACKET_INLINE std::uint32_t lanes_below(int count, int first) {
@@ -128,12 +114,57 @@ PACKET_INLINE void trace_by(const TraceBatch& batch, Trace&& trace) {
     }
 }
 
+/// One ray, which need not be gathered, nor its hit scattered.
+template <Query query, class Isa, class Stats>
+PACKET_INLINE BestHits<1, Isa> trace_singly(const SceneView& scene, const Ray& ray, Stats& stats) {
+    const RayAxes<Isa> world(ray);
+    const bool is_usable = usable(world);
+    BestHits<1, Isa> best(world.tfar, Mask<1, Isa>::from_bits(is_usable ? 1 : 0));
+    const TreeView& tree = first_tree(scene);
+    if (!is_usable || tree.is_empty()) return best;
+    SingleRay prepared;
+    prepare(prepared, tree, world);
+    walk_scene_singly<query>(scene, world, prepared, best, stats);
+    return best;
+}
+
+/// `out` is a miss.
+template <class Isa>
+PACKET_INLINE void store_hit(const SceneView& scene, const BestHits<1, Isa>& best, Hit& out) {
+    if (none(best.found())) return;
+    out.t = best.t.r[0], out.u = best.u.r[0], out.v = best.v.r[0];
+    out.prim_id = static_cast<std::uint32_t>(best.prim_id.r[0]);
+    out.mesh_id = mesh_of(scene, best.instance_id.r[0]);
+    out.instance_id = static_cast<std::uint32_t>(best.instance_id.r[0]);
+}
+
+template <class Isa>
+void closest_ray(const SceneView& scene, const Ray& ray, Hit& out) noexcept {
+    NoCounters stats(nullptr);
+    store_hit(scene, trace_singly<Query::kClosest, Isa>(scene, ray, stats), out);
+}
+
+template <class Isa>
+bool any_ray(const SceneView& scene, const Ray& ray) noexcept {
+    NoCounters stats(nullptr);
+    return any(trace_singly<Query::kAny, Isa>(scene, ray, stats).found());
+}
+
 template <Query query, class Isa, class Stats>
 void trace_batch_singly(const TraceBatch& batch) noexcept {
     Stats stats(batch.stats);
-    trace_by<query, kSingleLanes, Isa>(batch, [&](const RayColumns& rays, int count, auto& out) {
-        trace_singly<query>(*batch.scene, rays, lanes_below<kSingleLanes>(count, 0), stats, out, 0);
-    });
+    for (std::size_t i = 0; i < batch.count; ++i) {
+        const std::size_t at = place(batch, i);
+        const auto best = trace_singly<query, Isa>(*batch.scene, batch.rays[at], stats);
+        if constexpr (query == Query::kAny) {
+            batch.occluded[at] = any(best.found());
+        } else {
+            Hit& out = batch.hits[at];
+            out.t = __builtin_huge_valf(), out.u = out.v = 0.0f;
+            out.prim_id = out.mesh_id = out.instance_id = kInvalidId;
+            store_hit(*batch.scene, best, out);
+        }
+    }
 }
 
 template <Query query, int N, class Isa, class Stats>

@@ -38,7 +38,7 @@ public:
             const int most =
                 all - begin < kStreamRays ? static_cast<int>(all - begin) : kStreamRays;
             RayColumns columns = gather_rays(batch_.rays, begin, most, gathered_);
-            const int count = class_run<kSingleLanes, Isa>(columns.component + 4, most);
+            const int count = class_run<8, Isa>(columns.component + 4, most);
             if (batch_.best_t != nullptr) columns.component[7] = batch_.best_t + begin;
             load(columns, begin, count);
             run_stream();

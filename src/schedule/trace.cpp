@@ -245,16 +245,12 @@ void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uin
 
 Hit trace_closest(const Scene& scene, const Ray& ray) {
     Hit hit;
-    const TraceBatch batch{&scene.accel().view, &ray, nullptr, 1, &hit, nullptr, nullptr};
-    select_kernels({}).closest[KernelTable::kSingle][KernelTable::kNotCounting](batch);
+    select_kernels({}).closest_ray(scene.accel().view, ray, hit);
     return hit;
 }
 
 bool trace_any(const Scene& scene, const Ray& ray) {
-    std::uint8_t occluded = 0;
-    const TraceBatch batch{&scene.accel().view, &ray, nullptr, 1, nullptr, &occluded, nullptr};
-    select_kernels({}).any[KernelTable::kSingle][KernelTable::kNotCounting](batch);
-    return occluded != 0;
+    return select_kernels({}).any_ray(scene.accel().view, ray);
 }
 
 template <int N>
