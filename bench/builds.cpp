@@ -1,11 +1,12 @@
-// packet_builds: how fast our quickest builders are beside Embree's, over a million triangles, as a
-// table in Markdown. docs/benchmarking.md shows what it prints.
+// packet_builds: how fast our quickest builders are beside Embree's, over scenes or a million
+// generated triangles, as a table in Markdown. docs/benchmarking.md shows what it prints.
 #include "embree_reference.h"
 #include "markdown.h"
 #include "peak_memory.h"
 #include "program.h"
 
 #include <packet/accel.h>
+#include <packet/gltf.h>
 #include <packet/scene.h>
 
 #include <fmt/core.h>
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -24,6 +26,7 @@ namespace packet::bench {
 namespace {
 
 struct Options {
+    std::vector<std::filesystem::path> scenes;
     std::size_t triangles = 1'000'000;
     int repeats = 5;
 };
@@ -112,20 +115,30 @@ void hold_contest(std::string_view kind, const Scene& scene, const Builders& bui
     }
 }
 
+struct NamedScene {
+    std::string name;
+    Scene scene;
+};
+std::vector<NamedScene> scenes_of(const Options& options) {
+    std::vector<NamedScene> out;
+    for (const std::filesystem::path& path : options.scenes)
+        out.push_back({path.stem().string(), make_scene(load_gltf(path).scene.flatten())});
+    if (!out.empty()) return out;
+    for (const std::string_view kind : {"terrain", "city", "hairball", "soup"})
+        out.push_back({std::string(kind), make_scene(tools::generate(kind, options.triangles))});
+    return out;
+}
+
 void run(const Options& options) {
-    constexpr std::array<std::string_view, 4> kKinds = {"terrain", "city", "hairball", "soup"};
     const Builders builders = all_builders();
-    std::vector<Scene> scenes;
+    const std::vector<NamedScene> scenes = scenes_of(options);
     std::vector<Peaks> peaks;
     // First, as these processes must be started before there are threads.
-    for (const std::string_view kind : kKinds) {
-        scenes.push_back(make_scene(tools::generate(kind, options.triangles)));
-        peaks.push_back(peaks_of(builders, scenes.back()));
-    }
+    for (const NamedScene& scene : scenes) peaks.push_back(peaks_of(builders, scene.scene));
     print_table_head({"scene", "builder", "Mtriangles/s", "Embree = 1", "bytes/triangle", "at most",
                       "SAH cost"});
-    for (std::size_t i = 0; i < kKinds.size(); ++i) {
-        hold_contest(kKinds[i], scenes[i], builders, peaks[i], options);
+    for (std::size_t i = 0; i < scenes.size(); ++i) {
+        hold_contest(scenes[i].name, scenes[i].scene, builders, peaks[i], options);
     }
 }
 
@@ -136,9 +149,9 @@ void run(const Options& options) {
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     packet::bench::Options options;
-    CLI::App app("Builds generated scenes with our builders and Embree's, on all threads",
-                 "packet_builds");
-    app.add_option("--triangles", options.triangles, "of each scene")
+    CLI::App app("Builds scenes with our builders and Embree's, on all threads", "packet_builds");
+    app.add_option("SCENE", options.scenes, ".gltf or .glb files; none: generated ones");
+    app.add_option("--triangles", options.triangles, "of each generated scene")
         ->check(CLI::Range(std::size_t{1}, packet::tools::kMaxTriangles))
         ->capture_default_str();
     app.add_option("--repeat", options.repeats, "timed builds of each")

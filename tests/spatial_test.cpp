@@ -17,6 +17,8 @@ using namespace packet::test;
 
 namespace {
 
+constexpr std::size_t kAll = 1'000'000;  // samples, at least
+
 void add_triangle(TriangleMesh& mesh, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
     const auto first = static_cast<std::uint32_t>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), {a, b, c});
@@ -143,7 +145,7 @@ TEST_CASE("a plane that costs least parts the references as it was said to") {
     const TriangleMesh mesh = make_diagonals(500, 5);
     ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     const NodeRange node = whole_node(references, 700, parallel);
-    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel);
+    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel, kAll);
     REQUIRE(split.axis >= 0);
     const auto halves = split_space(mesh.view(), node, split, 0, parallel);
     REQUIRE(halves.has_value());
@@ -167,12 +169,30 @@ TEST_CASE("a plane that costs least parts the references as it was said to") {
     CHECK(below.capacity() + above.capacity() == node.capacity());
 }
 
+TEST_CASE("a plane from a sample of many references is about the one from all of them") {
+    const Parallel parallel(1);
+    const TriangleMesh mesh = make_diagonals(40'000, 6);
+    ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
+    const NodeRange node = whole_node(references, 20'000, parallel);
+    const auto find = [&](std::size_t fewest_samples) {
+        return find_spatial_split(mesh.view(), node, SahCosts({}), parallel, fewest_samples);
+    };
+    const SpatialSplit want = find(kAll), got = find(8192);
+    REQUIRE(want.axis >= 0);
+    REQUIRE(got.axis >= 0);
+    CHECK(5.0f * got.cost == doctest::Approx(want.cost).epsilon(0.05));
+    for (int side = 0; side < 2; ++side) CHECK(got.count[side] > 0.0f);
+    CHECK(got.count[0] + got.count[1] ==
+          doctest::Approx(want.count[0] + want.count[1]).epsilon(0.1));
+    CHECK(got.count[0] + got.count[1] < 61'000.0f);
+}
+
 TEST_CASE("with less room than a plane cuts triangles, as many are cut as there is room") {
     const Parallel parallel(1);
     const TriangleMesh mesh = make_diagonals(500, 6);
     ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     NodeRange node = whole_node(references, 1000, parallel);
-    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel);
+    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel, kAll);
     node.room = 3;
     const auto halves = split_space(mesh.view(), node, split, 0, parallel);
     REQUIRE(halves.has_value());
@@ -185,7 +205,7 @@ TEST_CASE("a plane is none where the halves might not fit the depth") {
     const TriangleMesh mesh = make_diagonals(500, 7);
     ScratchVector<Reference> references = collect_references(mesh.view(), parallel).items;
     const NodeRange node = whole_node(references, 500, parallel);
-    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel);
+    const SpatialSplit split = find_spatial_split(mesh.view(), node, SahCosts({}), parallel, kAll);
     CHECK(!split_space(mesh.view(), node, split, kMaxDepth - 5, parallel).has_value());
 }
 

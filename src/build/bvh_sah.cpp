@@ -16,6 +16,9 @@ namespace packet {
 
 namespace {
 
+// Of a node's references, to find a split.
+constexpr std::size_t kFewestSamples = 4096;
+
 class SahSplit {
 public:
     SahSplit(const BuildOptions& options, const Parallel& parallel)
@@ -23,7 +26,7 @@ public:
 
     std::optional<Halves> operator()(const NodeRange& node, int depth) const {
         if (is_surely_leaf(node, costs_)) return {};
-        const ObjectSplit split = find_object_split(node, costs_, parallel_, SplitSearch::kSampled);
+        const ObjectSplit split = find_object_split(node, costs_, parallel_, kFewestSamples);
         if (is_leaf(node, split.cost, costs_)) return {};
         return split_objects(node, split, depth, parallel_);
     }

@@ -31,6 +31,9 @@ namespace {
 constexpr float kLeastOfRoot = 3e-5f;
 constexpr float kLeastOfNode = 0.05f;
 
+// For both searches, whose costs are compared.
+constexpr std::size_t kFewestSamples = 16384;
+
 float overlap(const Bounds3f& a, const Bounds3f& b) {
     return Bounds3f{glm::max(a.lower, b.lower), glm::min(a.upper, b.upper)}.half_area();
 }
@@ -46,10 +49,10 @@ public:
 
     std::optional<Halves> operator()(const NodeRange& node, int depth) const {
         if (is_surely_leaf(node, costs_)) return {};
-        const ObjectSplit objects = find_object_split(node, costs_, parallel_);
+        const ObjectSplit objects = find_object_split(node, costs_, parallel_, kFewestSamples);
         SpatialSplit space;
         if (is_worth_cutting(node, objects)) {
-            space = find_spatial_split(mesh_, node, costs_, parallel_);
+            space = find_spatial_split(mesh_, node, costs_, parallel_, kFewestSamples);
         }
         if (is_leaf(node, std::min(objects.cost, space.cost), costs_)) return {};
         if (space.cost < objects.cost) {

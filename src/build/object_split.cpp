@@ -16,6 +16,11 @@ Binning::Binning(const Bounds3f& centroids) {
     scale_ = load_lanes(scale_vector_);
 }
 
+std::size_t sample_step(std::size_t count, std::size_t fewest_samples) {
+    constexpr std::size_t kLongestStep = 7;
+    return std::min(count / fewest_samples | 1, kLongestStep);
+}
+
 namespace {
 
 /// Aligned so that a bin's place is its number shifted.
@@ -46,12 +51,6 @@ struct Bins {
         }
     }
 };
-
-/// One in so many is looked at. Odd, since meshes are often made of pairs of triangles.
-std::size_t sample_step(std::size_t count) {
-    constexpr std::size_t kFewestSamples = 4096, kLongestStep = 7;
-    return std::min(count / kFewestSamples | 1, kLongestStep);
-}
 
 /// Few references along each axis, by their centroids and then as they come.
 struct Orders {
@@ -165,13 +164,13 @@ std::size_t part_by_bins(ReferenceSpan refs, const ObjectSplit& split, const Par
 }  // namespace
 
 ObjectSplit find_object_split(const NodeRange& node, const SahCosts& costs,
-                              const Parallel& parallel, SplitSearch search) {
+                              const Parallel& parallel, std::size_t fewest_samples) {
     const CountUnit unit(node.refs.size(), costs);
     if (node.refs.size() <= kFewReferences) return split_few(node.refs, unit);
     ObjectSplit best;
     const Binning& binning = best.binning = Binning(node.bounds.centroids);
     if (!binning.splits_any()) return best;
-    const std::size_t step = search == SplitSearch::kSampled ? sample_step(node.refs.size()) : 1;
+    const std::size_t step = sample_step(node.refs.size(), fewest_samples);
     best.is_sampled = step != 1;
     const Bins bins = fold_references<Bins>(
         node.refs, parallel,

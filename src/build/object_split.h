@@ -8,6 +8,7 @@
 #include "build/bin_sweep.h"
 #include "build/lane_bounds.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -45,8 +46,9 @@ private:
 };
 
 struct ObjectSplit {
-    float cost = std::numeric_limits<float>::infinity();  ///< of both halves: area times CountUnit
-    int axis = -1;                                        ///< -1: none
+    /// Of both halves: area times CountUnit of the sample.
+    float cost = std::numeric_limits<float>::infinity();
+    int axis = -1;                       ///< -1: none
     int place = 0;                       ///< bins below this go first, or so many if they are few
     Bounds3f bounds[2];                  ///< of the halves, unless it is sampled
     bool is_sampled = false;             ///< found from some of the references
@@ -54,17 +56,14 @@ struct ObjectSplit {
     std::uint8_t order[kFewReferences];  ///< if they are few: along the axis
 };
 
-/// Whether splits look at all references.
-enum class SplitSearch {
-    kAll,
-    kSampled  ///< of many references, at some: for who does not need to know what halves cost
-};
+/// Searches for splits look at one reference in so many, and at no fewer than `fewest_samples`.
+/// Odd, since meshes are often made of pairs of triangles.
+[[nodiscard]] std::size_t sample_step(std::size_t count, std::size_t fewest_samples);
 
 /// The cheapest split, if centroids can be told apart. O(references), on several threads if they
 /// are many.
 [[nodiscard]] ObjectSplit find_object_split(const NodeRange& node, const SahCosts& costs,
-                                            const Parallel& parallel,
-                                            SplitSearch search = SplitSearch::kAll);
+                                            const Parallel& parallel, std::size_t fewest_samples);
 
 /// Whether a node is better a leaf, and may be one, than split at a cost of area times count.
 [[nodiscard]] bool is_leaf(const NodeRange& node, float split_cost, const SahCosts& costs);

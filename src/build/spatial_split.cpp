@@ -4,7 +4,9 @@
 
 #include "build/bin_sweep.h"
 #include "build/lane_bounds.h"
+#include "build/object_split.h"
 
+#include <bit>
 #include <cmath>
 
 namespace packet {
@@ -60,40 +62,84 @@ private:
     Lanes origin_, widths_, scale_;
 };
 
-/// A triangle, to estimate the bounds of its parts. Cutting references takes exact ones.
-class SlicedTriangle {
-public:
-    SlicedTriangle(MeshView mesh, std::uint32_t id) {
+/// A triangle's, as numbers and in lanes.
+struct Corners {
+    glm::vec3 at[3];
+    Lanes lanes[3];
+
+    Corners(MeshView mesh, std::uint32_t id) {
         const glm::uvec3 t = mesh.triangles[id];
         for (int k = 0; k < 3; ++k) {
-            corner_[k] = mesh.positions[t[k]];
-            lanes_[k] = load_lanes(corner_[k]);
+            at[k] = mesh.positions[t[k]];
+            lanes[k] = load_lanes(at[k]);
         }
     }
-    /// Cuts `rest`, a box of a part of the triangle, at a plane: what is below is returned.
-    [[nodiscard]] LaneBox cut_off(LaneBox& rest, int axis, float plane) const {
-        LaneBox below, above;
-        for (int k = 0; k < 3; ++k) {
-            const int next = k == 2 ? 0 : k + 1;
-            const float x = corner_[k][axis], y = corner_[next][axis];
-            if (x <= plane) below.extend(lanes_[k], lanes_[k]);
-            if (x >= plane) above.extend(lanes_[k], lanes_[k]);
-            if ((x < plane && plane < y) || (y < plane && plane < x)) {
-                const Lanes share((plane - x) / (y - x));
-                const Lanes crossing = lanes_[k] + (lanes_[next] - lanes_[k]) * share;
-                below.extend(crossing, crossing);
-                above.extend(crossing, crossing);
-            }
-        }
-        below = {xsimd::max(below.lower, rest.lower), xsimd::min(below.upper, rest.upper)};
-        rest = {xsimd::max(above.lower, rest.lower), xsimd::min(above.upper, rest.upper)};
-        return below;
+};
+
+/// A triangle, to estimate the bounds of its parts between planes across an axis. Cutting
+/// references takes exact ones. Without branches on where corners are, which nobody can guess.
+class SlicedTriangle {
+public:
+    SlicedTriangle(const Corners& corners, int axis)
+        : low_(corners.lanes[0]),
+          middle_(corners.lanes[1]),
+          low_at_(corners.at[0][axis]),
+          middle_at_(corners.at[1][axis]),
+          high_(corners.lanes[2]) {
+        Lanes high_at(corners.at[2][axis]);
+        order(low_, low_at_, middle_, middle_at_);
+        order(middle_, middle_at_, high_, high_at);
+        order(low_, low_at_, middle_, middle_at_);
+        // Where two corners are at the same place, no plane comes between them to ask.
+        longest_ = (high_ - low_) / (high_at - low_at_);
+        lower_ = (middle_ - low_) / (middle_at_ - low_at_);
+        upper_ = (high_ - middle_) / (high_at - middle_at_);
+        edge_ = {low_, low_};
+        edge_at_ = low_at_;
+    }
+    /// The part between the last plane and this one, both below the highest corner.
+    [[nodiscard]] LaneBox cut_off(float plane) {
+        const Lanes at(plane);
+        LaneBox part = edge_;
+        const Lanes passed =
+            xsimd::select((edge_at_ <= middle_at_) & (middle_at_ <= at), middle_, edge_.lower);
+        part.extend(passed, passed);
+        const Lanes a = low_ + longest_ * (at - low_at_);
+        const Lanes b = xsimd::select(middle_at_ < at, middle_ + upper_ * (at - middle_at_),
+                                      low_ + lower_ * (at - low_at_));
+        edge_ = {xsimd::min(a, b), xsimd::max(a, b)};
+        edge_at_ = at;
+        part.extend(edge_.lower, edge_.upper);
+        return part;
+    }
+    /// What is above the last plane.
+    [[nodiscard]] LaneBox rest() const {
+        LaneBox part = edge_;
+        const Lanes passed = xsimd::select(edge_at_ <= middle_at_, middle_, high_);
+        part.extend(passed, passed);
+        part.extend(high_, high_);
+        return part;
     }
 
 private:
-    glm::vec3 corner_[3];
-    Lanes lanes_[3];
+    static void order(Lanes& a, Lanes& a_at, Lanes& b, Lanes& b_at) {
+        const auto is_ordered = a_at <= b_at;
+        const Lanes first = xsimd::select(is_ordered, a, b), last = xsimd::select(is_ordered, b, a);
+        const Lanes first_at = xsimd::min(a_at, b_at), last_at = xsimd::max(a_at, b_at);
+        a = first, a_at = first_at, b = last, b_at = last_at;
+    }
+
+    Lanes low_, middle_;  ///< corners by the axis
+    Lanes low_at_, middle_at_;
+    Lanes high_;
+    Lanes longest_, lower_, upper_;  ///< edges, for a unit of the axis
+    LaneBox edge_;                   ///< of what the last plane cuts
+    Lanes edge_at_;
 };
+
+LaneBox within(const LaneBox& part, const LaneBox& box) {
+    return {xsimd::max(part.lower, box.lower), xsimd::min(part.upper, box.upper)};
+}
 
 struct Slice {
     LaneBox box[3];
@@ -109,18 +155,27 @@ struct Slices {
     void add(const Reference& r, const Slicing& slicing, MeshView mesh) {
         const Slicing::Range range = slicing.range(r);
         const LaneBox box = lane_box(r);
+        std::uint32_t cut_axes = 0;
         for (int a = 0; a < 3; ++a) {
-            const int first = range.first.axis[a], last = range.last.axis[a];
+            const auto first = range.first.axis[a], last = range.last.axis[a];
             ++slice[first].first.axis[a];
             ++slice[last].last.axis[a];
-            LaneBox rest = box;
             if (first != last) {
-                const SlicedTriangle triangle(mesh, r.id);
-                for (int i = first; i < last; ++i) {
-                    slice[i].box[a].extend(triangle.cut_off(rest, a, slicing.plane(a, i + 1)));
-                }
+                cut_axes |= 1u << a;
+            } else {
+                slice[last].box[a].extend(box.lower, box.upper);
             }
-            slice[last].box[a].extend(rest);
+        }
+        if (cut_axes == 0) return;
+        const Corners corners(mesh, r.id);
+        for (; cut_axes != 0; cut_axes &= cut_axes - 1) {
+            const int a = std::countr_zero(cut_axes);
+            SlicedTriangle triangle(corners, a);
+            const int first = range.first.axis[a], last = range.last.axis[a];
+            for (int i = first; i < last; ++i) {
+                slice[i].box[a].extend(within(triangle.cut_off(slicing.plane(a, i + 1)), box));
+            }
+            slice[last].box[a].extend(within(triangle.rest(), box));
         }
     }
     void add(const Slices& other) {
@@ -135,16 +190,17 @@ struct Slices {
 }  // namespace
 
 SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const SahCosts& costs,
-                                const Parallel& parallel) {
+                                const Parallel& parallel, std::size_t fewest_samples) {
     const Slicing slicing(node.bounds.box);
+    const std::size_t step = sample_step(node.refs.size(), fewest_samples);
     const auto slices = fold_references<Slices>(
         node.refs, parallel,
         [&](Slices& out, ReferenceSpan piece) {
-            for (const Reference& r : piece) out.add(r, slicing, mesh);
+            for (std::size_t i = 0; i < piece.size(); i += step) out.add(piece[i], slicing, mesh);
         },
         [](Slices& a, const Slices& b) { a.add(b); });
     const Borders borders = find_borders(slices.slice, CountUnit(node.refs.size(), costs),
-                                         static_cast<float>(node.capacity()));
+                                         static_cast<float>(node.capacity() / step));
     SpatialSplit best;
     int plane = 0;
     for (int a = 0; a < 3; ++a) {
@@ -157,10 +213,11 @@ SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const SahC
     if (best.axis < 0) return best;
     best.bounds[0] = join_bins(slices.slice, best.axis, 0, plane);
     best.bounds[1] = join_bins(slices.slice, best.axis, plane, kBinCount);
+    const auto scale = static_cast<float>(step);
     for (int i = 0; i < kBinCount; ++i) {
         const Slice& s = slices.slice[i];
-        if (i < plane) best.count[0] += static_cast<float>(s.first.axis[best.axis]);
-        if (i >= plane) best.count[1] += static_cast<float>(s.last.axis[best.axis]);
+        if (i < plane) best.count[0] += scale * static_cast<float>(s.first.axis[best.axis]);
+        if (i >= plane) best.count[1] += scale * static_cast<float>(s.last.axis[best.axis]);
     }
     return best;
 }

@@ -15,17 +15,19 @@
 namespace packet {
 
 struct SpatialSplit {
-    float cost = std::numeric_limits<float>::infinity();  ///< of both sides: area times count
-    int axis = -1;                                        ///< -1: none
+    /// Of both sides: area times how many of the sample.
+    float cost = std::numeric_limits<float>::infinity();
+    int axis = -1;  ///< -1: none
     float position = 0.0f;
     Bounds3f bounds[2];             ///< of the sides, about
     float count[2] = {0.0f, 0.0f};  ///< references on them, about
 };
 
-/// The cheapest plane among those that add no more references than the node has room for.
-/// O(references), on several threads if they are many.
+/// The cheapest plane among those that add no more references than the node has room for, as a
+/// sample of them tells. O(references), on several threads if they are many.
 [[nodiscard]] SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node,
-                                              const SahCosts& costs, const Parallel& parallel);
+                                              const SahCosts& costs, const Parallel& parallel,
+                                              std::size_t fewest_samples);
 
 /// Parts the references at the plane. Those that reach to both sides are cut, if there is room, or
 /// go whole to one side where that is expected to cost less. None, and nothing is cut, where that
