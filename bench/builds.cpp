@@ -133,6 +133,7 @@ void run(const Options& options) {
     const Builders builders = all_builders();
     const std::vector<NamedScene> scenes = scenes_of(options);
     std::vector<Peaks> peaks;
+    peaks.reserve(scenes.size());
     // First, as these processes must be started before there are threads.
     for (const NamedScene& scene : scenes) peaks.push_back(peaks_of(builders, scene.scene));
     print_table_head({"scene", "builder", "Mtriangles/s", "Embree = 1", "bytes/triangle", "at most",

@@ -181,7 +181,7 @@ TEST_CASE("a plane from a sample of many references is about the one from all of
     REQUIRE(want.axis >= 0);
     REQUIRE(got.axis >= 0);
     CHECK(5.0f * got.cost == doctest::Approx(want.cost).epsilon(0.05));
-    for (int side = 0; side < 2; ++side) CHECK(got.count[side] > 0.0f);
+    for (const float count : got.count) CHECK(count > 0.0f);
     CHECK(got.count[0] + got.count[1] ==
           doctest::Approx(want.count[0] + want.count[1]).epsilon(0.1));
     CHECK(got.count[0] + got.count[1] < 61'000.0f);

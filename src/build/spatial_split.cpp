@@ -94,8 +94,7 @@ public:
         longest_ = (high_ - low_) / (high_at - low_at_);
         lower_ = (middle_ - low_) / (middle_at_ - low_at_);
         upper_ = (high_ - middle_) / (high_at - middle_at_);
-        edge_ = {low_, low_};
-        edge_at_ = low_at_;
+        start_at(low_, low_at_);
     }
     /// The part between the last plane and this one, both below the highest corner.
     [[nodiscard]] LaneBox cut_off(float plane) {
@@ -122,6 +121,10 @@ public:
     }
 
 private:
+    void start_at(const Lanes& corner, const Lanes& at) {
+        edge_ = {corner, corner};
+        edge_at_ = at;
+    }
     static void order(Lanes& a, Lanes& a_at, Lanes& b, Lanes& b_at) {
         const auto is_ordered = a_at <= b_at;
         const Lanes first = xsimd::select(is_ordered, a, b), last = xsimd::select(is_ordered, b, a);
@@ -193,6 +196,7 @@ SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const SahC
                                 const Parallel& parallel, std::size_t fewest_samples) {
     const Slicing slicing(node.bounds.box);
     const std::size_t step = sample_step(node.refs.size(), fewest_samples);
+    const auto scale = static_cast<float>(step);
     const auto slices = fold_references<Slices>(
         node.refs, parallel,
         [&](Slices& out, ReferenceSpan piece) {
@@ -200,7 +204,7 @@ SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const SahC
         },
         [](Slices& a, const Slices& b) { a.add(b); });
     const Borders borders = find_borders(slices.slice, CountUnit(node.refs.size(), costs),
-                                         static_cast<float>(node.capacity() / step));
+                                         static_cast<float>(node.capacity()) / scale);
     SpatialSplit best;
     int plane = 0;
     for (int a = 0; a < 3; ++a) {
@@ -213,7 +217,6 @@ SpatialSplit find_spatial_split(MeshView mesh, const NodeRange& node, const SahC
     if (best.axis < 0) return best;
     best.bounds[0] = join_bins(slices.slice, best.axis, 0, plane);
     best.bounds[1] = join_bins(slices.slice, best.axis, plane, kBinCount);
-    const auto scale = static_cast<float>(step);
     for (int i = 0; i < kBinCount; ++i) {
         const Slice& s = slices.slice[i];
         if (i < plane) best.count[0] += scale * static_cast<float>(s.first.axis[best.axis]);
