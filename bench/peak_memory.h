@@ -1,6 +1,7 @@
 // What memory a piece of work needs at most.
 #pragma once
 
+#include <malloc.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -27,14 +28,15 @@ namespace packet::bench {
 }
 
 /// By how many bytes what the process holds in memory grows at most during `work`. This is done in
-/// a child, which nothing was freed in before. Call it before the process starts threads, which
-/// the child does not have. Throws std::runtime_error if that fails.
+/// a child, which has given back what was freed before. Call it before the process starts
+/// threads, which the child does not have. Throws std::runtime_error if that fails.
 [[nodiscard]] inline std::size_t peak_bytes_of(const std::function<void()>& work) {
     std::array<int, 2> ends{};
     if (pipe(ends.data()) != 0) throw std::runtime_error("cannot make a pipe");
     const pid_t child = fork();
     if (child < 0) throw std::runtime_error("cannot start a process");
     if (child == 0) {
+        malloc_trim(0);  // else what loading a scene has freed would serve the work
         const std::size_t before = resident_bytes("VmRSS");
         std::ofstream("/proc/self/clear_refs") << "5";  // the peak starts anew
         work();

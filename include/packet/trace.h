@@ -99,8 +99,10 @@ void trace_closest(const Scene& scene, std::span<const Ray> rays, std::span<Hit>
 void trace_any(const Scene& scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                const TraceOptions& options = {});
 
-/// Closest hit of one ray, on this thread. Many at once are 1.4 to 6 times as fast, a ray.
+/// Closest hit of one ray, on this thread. Many at once take 0.15 to 0.7 of the time, a ray. Throws
+/// Error{kNotCommitted}.
 [[nodiscard]] Hit trace_closest(const Scene& scene, const Ray& ray);
+/// Whether one ray hits anything, likewise.
 [[nodiscard]] bool trace_any(const Scene& scene, const Ray& ray);
 
 /// Closest hits of one packet, on this thread. Inactive lanes of `rays` are not read and those of

@@ -212,6 +212,7 @@ PACKET_INLINE Axes<Isa> axes(float x, float y, float z) {
     }
     return out;
 }
+
 /// Which axes come first, second and third.
 template <int i0, int i1, int i2, class Isa>
 PACKET_INLINE Axes<Isa> permute(const Axes<Isa>& a) {
@@ -234,6 +235,7 @@ PACKET_INLINE Axes<Isa> permute(const Axes<Isa>& a, const AxisOrder& order) {
     }
     return out;
 }
+
 /// Of the three, which hold.
 template <class Isa>
 PACKET_INLINE std::uint32_t axis_bits(Mask<4, Isa> m) {
