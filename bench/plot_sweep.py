@@ -114,7 +114,7 @@ def plot_sweeps(results, folder):
             axis.set_ylabel(name if column == 0 else "")
             if measure is rate:
                 axis.set_yscale("log")
-                axis.set_ylim(1, 100)
+                axis.set_ylim(1, 200)
                 axis.yaxis.set_major_formatter("{x:.0f}")
             else:
                 axis.set_ylim(bottom=0)
